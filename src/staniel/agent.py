@@ -1,0 +1,192 @@
+"""One aircraft's mind: tracking, then cooperation, then guidance.
+
+It has three doors and no others: a percept and an inbox come in, a command and an outbox go out.
+What flies knows only what it saw, what it was told, and what it was ordered.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from staniel.city import City
+from staniel.cooperation import Allocation, CooperationConfig, SearchMap, Task
+from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
+from staniel.datatypes.clock import Clock
+from staniel.datatypes.command import Command, FlyLine
+from staniel.datatypes.equipment import Airframe, Camera
+from staniel.datatypes.message import Heartbeat, Message, Point, Report
+from staniel.guidance import GuidanceConfig, Pursuit, loiter, pursuit_policy_named
+from staniel.kernels.dubins import lengths
+from staniel.tracking import Tracker, TrackingConfig
+
+__all__ = ["Agent", "Briefing"]
+
+
+@dataclass(frozen=True, slots=True)
+class Briefing:
+    """What every agent of a team is told before the start."""
+
+    chart: City
+    clock: Clock
+    airframe: Airframe
+    camera: Camera
+    tracking: TrackingConfig
+    cooperation: CooperationConfig
+    guidance: GuidanceConfig
+
+
+class Agent:
+    """The mind of one aircraft.
+
+    Parameters
+    ----------
+    id : int
+        The aircraft's number in the team.
+    briefing : Briefing
+    rng : numpy.random.Generator
+        Its own.
+    """
+
+    def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
+        airframe, clock = briefing.airframe, briefing.clock
+        self.id, self._briefing = id, briefing
+        self._tracker = Tracker(briefing.tracking, rng, founder=id)
+        self._allocation = Allocation(
+            id,
+            briefing.cooperation,
+            turn_radius=airframe.min_turn_radius,
+            step=clock.decision_step,
+        )
+        self._search = SearchMap(
+            briefing.chart, airframe, briefing.camera, cell=briefing.cooperation.search_cell
+        )
+        self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
+        self._lookahead = briefing.guidance.prediction_steps * clock.decision_step
+        self._last_place: tuple[Point, float] | None = None
+        self._seen_holding = -math.inf
+        self.belief = Belief((), "search", None, (0.0, 0.0))
+
+    def step(self, percept: Percept, inbox: Sequence[Message]) -> tuple[Command, list[Message]]:
+        """Perceive, hear, decide, act: once every decision step.
+
+        Parameters
+        ----------
+        percept : Percept
+            What the aircraft perceives now.
+        inbox : sequence of Message
+            What arrived since the last step.
+
+        Returns
+        -------
+        command : Command
+            For the autopilot, until the next step.
+        outbox : list of Message
+            To be broadcast; heard in the next step at the earliest.
+        """
+        time, pose = percept.time, percept.pose
+        tracks = self._track(percept, inbox)
+        outbox = self._allocate(percept, tracks, inbox)
+        command, role, goal = self._fly(time, pose, inbox, outbox)
+        if percept.sightings:
+            outbox.append(
+                Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
+            )
+        outbox.append(self._allocation.heartbeat(role, goal))
+        held = self._allocation.holding
+        self.belief = Belief(self._tracker.estimates, role, None if held is None else held.id, goal)
+        return command, outbox
+
+    def _track(self, percept: Percept, inbox: Sequence[Message]) -> list[TrackEstimate]:
+        """Own sightings and those of the others, fused in one tracker."""
+        sightings: list[Sighting] = list(percept.sightings)
+        for message in inbox:
+            if isinstance(message, Report):
+                sightings.extend(message.sightings)
+        return self._tracker.step(percept.time, sightings)
+
+    def _allocate(
+        self, percept: Percept, tracks: list[TrackEstimate], inbox: Sequence[Message]
+    ) -> list[Message]:
+        """Auctions: what the tracks cost this aircraft, what the others said, who watches what."""
+        outbox = self._allocation.step(
+            percept.time, percept.pose, self._tasks(percept, tracks), inbox
+        )
+        for old, new in self._allocation.renames:
+            self._tracker.rename(old, new)
+        return outbox
+
+    def _tasks(self, percept: Percept, tracks: list[TrackEstimate]) -> list[Task]:
+        if not tracks:
+            return []
+        pose = percept.pose
+        goals = [(*track.position.tolist(), track.course) for track in tracks]
+        costs = lengths(
+            np.array((pose.x, pose.y, pose.heading)),
+            np.array(goals),
+            self._briefing.airframe.min_turn_radius,
+        ).tolist()
+        own = [tuple(sighting.position.tolist()) for sighting in percept.sightings]
+        near = self._briefing.cooperation.same_target
+        return [
+            Task(
+                track.id,
+                (x, y),
+                course,
+                cost,
+                track.last_seen >= percept.time and any(math.dist((x, y), z) < near for z in own),
+            )
+            for track, (x, y, course), cost in zip(tracks, goals, costs, strict=True)
+        ]
+
+    def _fly(
+        self, time: float, pose: Pose, inbox: Sequence[Message], outbox: list[Message]
+    ) -> tuple[Command, str, Point]:
+        """Pursue the held target; else loiter where one was lost; else search."""
+        heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
+        self._search.look(time, [pose, *(message.pose for message in heartbeats)])
+        held, guidance = self._allocation.holding, self._briefing.guidance
+        if held is not None:
+            track = self._track_named(held.id)
+            if track is not None:
+                self._seen_holding = time
+                self._last_place = (held.position, time)
+                self._search.forget_goal()
+                return self._pursue(self._pursuit(time, pose, track)), "pursue", held.position
+            since = max(self._seen_holding, held.since)
+            if self._tracker_lost(held.id) or time - since > guidance.recover_time:
+                outbox.append(self._allocation.give_up())
+            self._last_place = (held.position, since)
+        if self._last_place is not None:
+            place, since = self._last_place
+            if time - since <= guidance.recover_time:
+                self._search.forget_goal()
+                command = loiter(pose, place, self._briefing.airframe, guidance)
+                return command, "recover", place
+            self._last_place = None
+        others = [message.goal for message in heartbeats if message.role == "search"]
+        goal = self._search.goal(time, pose, others)
+        airframe = self._briefing.airframe
+        line = FlyLine((pose.x, pose.y), goal, airframe.speed, airframe.altitude)
+        return line, "search", goal
+
+    def _pursuit(self, time: float, pose: Pose, track: TrackEstimate) -> Pursuit:
+        briefing = self._briefing
+        return Pursuit(
+            time=time,
+            pose=pose,
+            track=track,
+            waypoint=track.ahead(self._lookahead),
+            cloud=lambda: (self._tracker.particles(track.id), self._tracker.weights(track.id)),
+            airframe=briefing.airframe,
+            camera=briefing.camera,
+            chart=briefing.chart,
+            config=briefing.guidance,
+        )
+
+    def _track_named(self, name: TrackId) -> TrackEstimate | None:
+        return next((track for track in self._tracker.estimates if track.id == name), None)
+
+    def _tracker_lost(self, name: TrackId) -> bool:
+        return any(track.id == name for track in self._tracker.lost)

@@ -1,0 +1,7 @@
+"""What the team agrees: who watches which target, and where to search."""
+
+from staniel.cooperation.auction import Allocation, Holding, Task
+from staniel.cooperation.config import CooperationConfig
+from staniel.cooperation.search import SearchMap
+
+__all__ = ["Allocation", "CooperationConfig", "Holding", "SearchMap", "Task"]

@@ -1,0 +1,132 @@
+"""Where nobody has looked for longest: a map of ages over the streets, one in each agent's head."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.city import City
+from staniel.datatypes.belief import Pose
+from staniel.datatypes.equipment import Airframe, Camera
+from staniel.kernels.search import choose, mark
+
+__all__ = ["SearchMap"]
+
+NEVER = -600.0
+"""When a cell that nobody has looked at counts as looked at [s]: older than anything seen."""
+
+PATIENCE = 40.0
+"""A goal not looked at within this time is given up for a better one [s]."""
+
+LOOK_EVERY = 2.0
+"""Time between two entries [s]: an aircraft moves little more than a cell meanwhile."""
+
+SPACING = 150.0
+"""Two searching aircraft keep their goals this far apart if they can [m]."""
+
+
+class SearchMap:
+    """When each street cell of the chart was last looked at, by this aircraft or one it heard of.
+
+    Parameters
+    ----------
+    chart : City
+        The map that the agent holds; streets are where it has no building.
+    airframe, camera : Airframe, Camera
+        The team's: others' poses are taken to carry the same camera.
+    cell : float [m]
+        Side of a cell.
+    """
+
+    def __init__(self, chart: City, airframe: Airframe, camera: Camera, *, cell: float) -> None:
+        self._chart, self._airframe, self._camera, self._cell = chart, airframe, camera, cell
+        self._places = _street_places(chart, cell, camera.target_height)
+        self._looked = np.full(self._places.shape[:2], NEVER)
+        self._goal: tuple[int, int] | None = None
+        self._chosen_at = -math.inf
+        self._looked_at = -math.inf
+
+    @property
+    def ages(self) -> NDArray[np.float64]:
+        """When each cell was last looked at, rows from the south [s]; NaN without a street."""
+        return np.where(np.isnan(self._places[:, :, 0]), np.nan, self._looked)
+
+    def look(self, time: float, poses: Sequence[Pose]) -> None:
+        """Take note of what cameras at `poses` have a free view of, by the chart, at `time` [s]."""
+        if time - self._looked_at < LOOK_EVERY:
+            return
+        self._looked_at = time
+        mark(
+            self._chart.walls,
+            self._looked,
+            self._places,
+            self._cell,
+            np.array(poses, dtype=np.float64),
+            self._camera.half_aperture,
+            self._camera.range,
+            time,
+        )
+
+    def goal(
+        self, time: float, pose: Pose, others: Sequence[tuple[float, float]]
+    ) -> tuple[float, float]:
+        """Where to fly to look: kept until it was looked at, or for `PATIENCE`.
+
+        Parameters
+        ----------
+        time : float [s]
+        pose : Pose
+        others : sequence of (float, float) [m]
+            Goals of the other searching aircraft, as they said.
+
+        Returns
+        -------
+        (float, float) [m]
+            The middle of the city, if it has no streets at all.
+        """
+        if self._goal is not None and time - self._chosen_at < PATIENCE:
+            kept = self._goal
+            if self._looked[kept] < self._chosen_at:
+                return self._place(kept)
+        self._goal = choose(
+            self._looked,
+            self._places,
+            np.array(pose),
+            self._airframe.min_turn_radius,
+            np.array(others, dtype=np.float64).reshape(-1, 2),
+            SPACING,
+            time,
+        )
+        self._chosen_at = time
+        return self._place(self._goal)
+
+    def forget_goal(self) -> None:
+        """Choose anew next time: the aircraft was elsewhere in between."""
+        self._goal = None
+
+    def _place(self, index: tuple[int, int]) -> tuple[float, float]:
+        if index[0] < 0:
+            return self._chart.size[0] / 2.0, self._chart.size[1] / 2.0
+        return float(self._places[index][0]), float(self._places[index][1])
+
+
+def _street_places(chart: City, cell: float, height: float) -> NDArray[np.float64]:
+    """One point a cell: of nine, the free one nearest to the cell's middle; NaN if none is free."""
+    columns, rows = (math.ceil(side / cell) for side in chart.size)
+    steps = np.array([0.5, 1.0 / 6.0, 5.0 / 6.0])
+    x = np.arange(columns)[None, :]
+    y = np.arange(rows)[:, None]
+    places = np.full((rows, columns, 3), np.nan)
+    places[:, :, 2] = height
+    candidates = sorted(
+        ((a, b) for a in steps for b in steps), key=lambda p: abs(p[0] - 0.5) + abs(p[1] - 0.5)
+    )
+    for a, b in candidates:
+        px = np.minimum((x + a) * cell + 0.0 * y, chart.size[0])
+        py = np.minimum((y + b) * cell + 0.0 * x, chart.size[1])
+        free = ~chart.inside(np.stack([px, py], axis=-1).reshape(-1, 2)).reshape(rows, columns)
+        take = free & np.isnan(places[:, :, 0])
+        places[:, :, 0][take] = px[take]
+        places[:, :, 1][take] = py[take]
+    return places

@@ -1,0 +1,179 @@
+"""What an agent perceives and believes: poses, sightings, track estimates, beliefs."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["Belief", "Percept", "Pose", "Sighting", "TrackEstimate", "TrackId"]
+
+
+class Pose(NamedTuple):
+    """Where an aircraft is and how it lies: m and rad, east-north-up, left bank positive."""
+
+    x: float
+    y: float
+    z: float
+    heading: float
+    bank: float
+    speed: float
+
+
+class TrackId(NamedTuple):
+    """Identity of a track in the whole team. Of two names for one target the older sorts first."""
+
+    born: float
+    founder: int
+    serial: int
+
+    def __str__(self) -> str:
+        return f"{self.founder}-{self.serial}"
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One camera detection: anonymous, with its covariance and the pose it was taken from.
+
+    Parameters
+    ----------
+    time : float [s]
+        When the picture was taken.
+    position : (2,) array_like [m]
+        On the ground, east and north.
+    covariance : (2, 2) array_like [m²]
+        Of the position; symmetric and positive definite.
+    reporter : int, optional
+        Who saw it; -1 when unknown.
+    pose : Pose, optional
+        Where the camera was.
+
+    Raises
+    ------
+    ValueError
+        Wrong shape, a value that is not finite, a covariance that is not positive definite.
+
+    Examples
+    --------
+    >>> Sighting(3.0, [10.0, 20.0], [[2.25, 0.0], [0.0, 2.25]], reporter=1).position
+    array([10., 20.])
+    """
+
+    time: float
+    position: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    reporter: int = field(default=-1, kw_only=True)
+    pose: Pose | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", _floats(self.position, (2,), "position"))
+        covariance = _floats(self.covariance, (2, 2), "covariance")
+        object.__setattr__(self, "covariance", covariance)
+        a, b, c, d = covariance.ravel().tolist()
+        if abs(b - c) > 1e-9 * (abs(a) + abs(d)) or a <= 0.0 or a * d - b * c <= 0.0:
+            raise ValueError(
+                f"Sighting.covariance = {covariance.tolist()}: "
+                "expected a symmetric, positive definite matrix"
+            )
+        if not math.isfinite(self.time):
+            raise ValueError(f"Sighting.time = {self.time}: expected a finite number of seconds")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Sighting):
+            return NotImplemented
+        return self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[Any, ...]:
+        return (
+            self.time,
+            self.reporter,
+            self.pose,
+            self.position.tobytes(),
+            self.covariance.tobytes(),
+        )
+
+
+def _floats(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape != shape:
+        raise ValueError(f"Sighting.{name} has shape {array.shape}: expected {shape}")
+    if not all(map(math.isfinite, array.ravel().tolist())):
+        raise ValueError(f"Sighting.{name} = {array.tolist()}: expected finite numbers")
+    return array
+
+
+@dataclass(frozen=True, slots=True)
+class TrackEstimate:
+    """What a tracker says of one target at one time.
+
+    Attributes
+    ----------
+    id : TrackId
+    time : float [s]
+        Of the estimate.
+    position : (2,) float array [m]
+    velocity : (2,) float array [m/s]
+    covariance : (2, 2) float array [m²]
+        Of the position.
+    existence : float
+        Probability in [0, 1] that the target is there at all.
+    last_seen : float [s]
+        Time of the newest sighting that went into it.
+    """
+
+    id: TrackId
+    time: float
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    existence: float
+    last_seen: float
+
+    @property
+    def course(self) -> float:
+        """Direction of motion [rad], counter-clockwise from east (thesis eq. 6.24, corrected)."""
+        return math.atan2(float(self.velocity[1]), float(self.velocity[0]))
+
+    @property
+    def speed(self) -> float:
+        """Speed over ground [m/s]."""
+        return math.hypot(float(self.velocity[0]), float(self.velocity[1]))
+
+    def ahead(self, seconds: float) -> NDArray[np.float64]:
+        """Position `seconds` later, if it keeps its velocity [m]."""
+        return self.position + seconds * self.velocity
+
+
+@dataclass(frozen=True, slots=True)
+class Percept:
+    """What one aircraft perceives in one tick: its own navigation and its own camera."""
+
+    time: float
+    pose: Pose
+    sightings: tuple[Sighting, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What an agent holds true and what it is doing: for the recorder, never for another agent.
+
+    Attributes
+    ----------
+    tracks : sequence of TrackEstimate
+    role : str
+        ``"search"``, ``"pursue"`` or ``"recover"``.
+    target : TrackId or None
+        The track it is responsible for.
+    goal : (float, float) [m]
+        Where it is heading.
+    """
+
+    tracks: Sequence[TrackEstimate]
+    role: str
+    target: TrackId | None
+    goal: tuple[float, float]

@@ -1,0 +1,27 @@
+"""The errors that staniel raises on purpose.
+
+Every one of them is a `StanielError`; the command line prints its message and ends with exit code
+2. A message names the field, the value, what was expected and, where there is one, the file.
+"""
+
+__all__ = ["CityError", "OutputError", "RecordError", "ScenarioError", "StanielError"]
+
+
+class StanielError(ValueError):
+    """Something that the user handed in cannot be used as it is."""
+
+
+class ScenarioError(StanielError):
+    """A scenario, or a change to one, is missing, malformed or cannot be flown."""
+
+
+class CityError(StanielError):
+    """A map, an outline or a height cannot be used."""
+
+
+class RecordError(StanielError):
+    """A recorded run is missing, damaged or of an unknown version."""
+
+
+class OutputError(StanielError):
+    """Results cannot be written where they were asked for."""

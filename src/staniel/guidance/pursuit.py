@@ -1,0 +1,119 @@
+"""Pursuit policies: where to fly so that a target stays in sight. Rivals of one signature, by name.
+
+A policy is a plain function ``(Pursuit) -> Command``. Whoever writes one of his own registers it::
+
+    @pursuit_policy("mine")
+    def mine(pursuit: Pursuit) -> Command: ...
+
+and names it in the scenario: ``guidance.pursuit = "mine"``.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.city import City
+from staniel.datatypes.belief import Pose, TrackEstimate
+from staniel.datatypes.command import Command, FlyLine
+from staniel.datatypes.equipment import Airframe, Camera
+from staniel.guidance.config import GuidanceConfig
+from staniel.guidance.loiter import loiter
+
+__all__ = ["Policy", "Pursuit", "carrot", "pursuit_names", "pursuit_policy", "pursuit_policy_named"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pursuit:
+    """What a pursuit policy may look at: one aircraft, one track, and the map.
+
+    Attributes
+    ----------
+    time : float [s]
+    pose : Pose
+        The aircraft's own.
+    track : TrackEstimate
+        Of the target, now.
+    waypoint : (2,) float array [m]
+        The track's prediction `GuidanceConfig.prediction_steps` decision steps ahead (thesis 5.5).
+    cloud : callable
+        ``particles, weights = cloud()``: the belief about the target, (n, 4) float array of x, y [m],
+        vx, vy [m/s] and (n,) float array of weights that sum to 1. Made when it is asked for.
+    airframe, camera : Airframe, Camera
+    chart : City
+        The map that the agent holds.
+    config : GuidanceConfig
+    """
+
+    time: float
+    pose: Pose
+    track: TrackEstimate
+    waypoint: NDArray[np.float64]
+    cloud: Callable[[], tuple[NDArray[np.float64], NDArray[np.float64]]]
+    airframe: Airframe
+    camera: Camera
+    chart: City
+    config: GuidanceConfig
+
+
+Policy = Callable[[Pursuit], Command]
+
+_POLICIES: dict[str, Policy] = {}
+
+
+def pursuit_policy(name: str) -> Callable[[Policy], Policy]:
+    """Register the decorated function as the pursuit policy `name`.
+
+    Parameters
+    ----------
+    name : str
+        What ``guidance.pursuit`` calls it.
+
+    Raises
+    ------
+    ValueError
+        The name is taken by another function.
+    """
+
+    def register(policy: Policy) -> Policy:
+        if _POLICIES.get(name, policy) is not policy:
+            raise ValueError(f"pursuit policy {name!r} is registered already")
+        _POLICIES[name] = policy
+        return policy
+
+    return register
+
+
+def pursuit_names() -> list[str]:
+    """Names of all registered pursuit policies, sorted."""
+    return sorted(_POLICIES)
+
+
+def pursuit_policy_named(name: str) -> Policy:
+    """The policy registered as `name`.
+
+    Raises
+    ------
+    ValueError
+        Nobody registered it.
+    """
+    try:
+        return _POLICIES[name]
+    except KeyError:
+        raise ValueError(
+            f"guidance.pursuit = {name!r}: expected one of {', '.join(pursuit_names())}"
+        ) from None
+
+
+@pursuit_policy("carrot")
+def carrot(pursuit: Pursuit) -> Command:
+    """Chase the predicted place along a line; circle it when close (thesis 5.5, alg. 5.3)."""
+    x, y = pursuit.waypoint.tolist()
+    pose, config = pursuit.pose, pursuit.config
+    distance = math.hypot(x - pose.x, y - pose.y)
+    if distance > config.loiter_entry * config.loiter_radius:
+        airframe = pursuit.airframe
+        return FlyLine((pose.x, pose.y), (x, y), airframe.speed, airframe.altitude)
+    return loiter(pose, (x, y), pursuit.airframe, config)

@@ -1,0 +1,266 @@
+"""New targets: peaks on a grid of static particles, and the places that come back (thesis 6.3)."""
+
+from math import exp, floor, sqrt
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["fit", "follow", "propose", "warm"]
+
+Array = NDArray[Any]
+
+_CLIMB = 8
+_SAME_TIME = 1e-6
+
+
+@njit(cache=True, error_model="numpy")
+def _window(
+    sightings: Array,
+    near: Array,
+    found: int,
+    node: tuple[int, int],
+    spacing: float,
+    reach: int,
+    out: Array,
+) -> tuple[int, int]:
+    """Weights of the static particles around a node under the first `found` sightings of `near`.
+
+    Returns the heaviest particle's steps east and north of the node.
+    """
+    own = 0.25 * spacing * spacing
+    side = 2 * reach + 1
+    for b in range(side):
+        for a in range(side):
+            out[b, a] = 0.0
+    for i in range(found):
+        z = sightings[near[i]]
+        # A static particle stands for its cell: the cell's extent adds to the covariance.
+        sxx, sxy, syy = z[3] + own, z[4], z[5] + own
+        det = sxx * syy - sxy * sxy
+        norm = 1.0 / sqrt(det)
+        for b in range(side):
+            dy = (node[1] + b - reach) * spacing - z[2]
+            for a in range(side):
+                dx = (node[0] + a - reach) * spacing - z[1]
+                square = (syy * dx * dx - 2.0 * sxy * dx * dy + sxx * dy * dy) / det
+                out[b, a] += norm * exp(-0.5 * square)
+    east, north = reach, reach
+    for b in range(side):
+        for a in range(side):
+            if out[b, a] > out[north, east]:
+                east, north = a, b
+    return east - reach, north - reach
+
+
+@njit(cache=True, error_model="numpy")
+def propose(sightings: Array, spacing: float, reach: int) -> Array:
+    """Candidate places: local maxima of the static particles' weight, one time at a time.
+
+    The grid is anchored at the origin and has no border: only windows near sightings are touched,
+    so that the cost grows with the sightings and not with the area.
+
+    Parameters
+    ----------
+    sightings : (m, 6) float64 array
+        Time [s], x, y [m], covariance xx, xy, yy [m²]; in ascending order of time, then of x.
+    spacing : float [m]
+        Between static particles.
+    reach : int
+        A window has 2 reach + 1 static particles a side.
+
+    Returns
+    -------
+    (p, 6) float64 array
+        Places in the same columns: weighted centroid of the window around each local maximum, and
+        the covariance of the sightings that led there, composed. In ascending order of time.
+    """
+    m = sightings.shape[0]
+    side = 2 * reach + 1
+    weights = np.empty((side, side))
+    places = np.empty((m, 6))
+    nodes = np.empty((m, 2), np.int64)
+    near = np.empty(m, np.int64)
+    count = 0
+    width = (2 * reach + 1) * spacing
+    for j in range(m):
+        z = sightings[j]
+        east, north = floor(z[1] / spacing + 0.5), floor(z[2] / spacing + 0.5)
+        for _ in range(_CLIMB):
+            found = _neighbours(sightings, j, east * spacing, north * spacing, width, near)
+            a, b = _window(sightings, near, found, (east, north), spacing, reach, weights)
+            if a == 0 and b == 0:
+                break
+            east += a
+            north += b
+        known = -1
+        for p in range(count - 1, -1, -1):
+            if z[0] - places[p, 0] > _SAME_TIME:
+                break
+            if nodes[p, 0] == east and nodes[p, 1] == north:
+                known = p
+                break
+        if known >= 0:
+            _compose(places[known], z[3], z[4], z[5])
+            continue
+        nodes[count, 0], nodes[count, 1] = east, north
+        total, sum_x, sum_y = 0.0, 0.0, 0.0
+        for b in range(side):
+            for a in range(side):
+                total += weights[b, a]
+                sum_x += weights[b, a] * (a - reach)
+                sum_y += weights[b, a] * (b - reach)
+        place = places[count]
+        place[0] = z[0]
+        place[1] = (east + sum_x / total) * spacing
+        place[2] = (north + sum_y / total) * spacing
+        place[3], place[4], place[5] = z[3], z[4], z[5]
+        count += 1
+    return places[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def _neighbours(sightings: Array, j: int, x: float, y: float, width: float, out: Array) -> int:
+    """Sightings of the time of number `j` whose place is within `width` of (x, y) on both axes."""
+    found = 0
+    time = sightings[j, 0]
+    first = j
+    while first > 0 and time - sightings[first - 1, 0] <= _SAME_TIME:
+        if x - sightings[first - 1, 1] > width:
+            break
+        first -= 1
+    for number in range(first, sightings.shape[0]):
+        z = sightings[number]
+        if z[0] - time > _SAME_TIME or z[1] - x > width:
+            break
+        if abs(z[1] - x) <= width and abs(z[2] - y) <= width:
+            out[found] = number
+            found += 1
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _compose(place: Array, xx: float, xy: float, yy: float) -> None:
+    """Covariance of a place after one more independent look: (P⁻¹ + Σ⁻¹)⁻¹, in place."""
+    p_det = place[3] * place[5] - place[4] * place[4]
+    z_det = xx * yy - xy * xy
+    ixx, ixy, iyy = (
+        place[5] / p_det + yy / z_det,
+        -place[4] / p_det - xy / z_det,
+        place[3] / p_det + xx / z_det,
+    )
+    det = ixx * iyy - ixy * ixy
+    place[3], place[4], place[5] = iyy / det, -ixy / det, ixx / det
+
+
+@njit(cache=True, error_model="numpy")
+def follow(candidates: Array, places: Array, max_speed: float, gate: float) -> Array:
+    """Let candidates claim the places they can have reached; the rest become new candidates.
+
+    A candidate claims the nearest place within reach of its last hit, ``max_speed·Δt`` plus `gate`
+    standard deviations of both. A place at the time of its last hit refines that hit instead of
+    counting again; an older one is absorbed. One step without a hit is allowed.
+
+    Parameters
+    ----------
+    candidates : (c, 2 + 6 h) float64 array
+        Number of hits, steps since the last, then up to `h` hits as in `propose`.
+    places : (p, 6) float64 array
+        Of `propose`, ascending in time.
+    max_speed : float [m/s]
+    gate : float [sigma]
+
+    Returns
+    -------
+    (c', 2 + 6 h) float64 array
+        The surviving and the new candidates; one with `h` hits is confirmed.
+    """
+    c, p = candidates.shape[0], places.shape[0]
+    out = np.zeros((c + p, candidates.shape[1]))
+    count = 0
+    for i in range(c):
+        if candidates[i, 1] < 2.0:
+            for column in range(candidates.shape[1]):
+                out[count, column] = candidates[i, column]
+            out[count, 1] += 1.0
+            count += 1
+    alive = count
+    full = (candidates.shape[1] - 2) // 6
+    for q in range(p):
+        place = places[q]
+        best, closest = -1, 1.0
+        for i in range(alive):
+            base = 6 * int(out[i, 0]) - 4
+            variance = out[i, base + 3] + out[i, base + 5] + place[3] + place[5]
+            reach = gate * sqrt(variance) + max_speed * abs(place[0] - out[i, base])
+            dx, dy = place[1] - out[i, base + 1], place[2] - out[i, base + 2]
+            share = (dx * dx + dy * dy) / (reach * reach)
+            if share < closest:
+                best, closest = i, share
+        if best < 0:
+            out[count, 0] = 1.0
+            for column in range(6):
+                out[count, 2 + column] = place[column]
+            count += 1
+            continue
+        base = 6 * int(out[best, 0]) - 4
+        last = out[best, base : base + 6]
+        if place[0] - last[0] > _SAME_TIME:
+            if out[best, 0] < full:
+                out[best, 0] += 1.0
+                for column in range(6):
+                    out[best, base + 6 + column] = place[column]
+            out[best, 1] = 0.0
+        elif last[0] - place[0] <= _SAME_TIME:
+            share = (place[3] + place[5]) / (last[3] + last[5] + place[3] + place[5])
+            last[1] = share * last[1] + (1.0 - share) * place[1]
+            last[2] = share * last[2] + (1.0 - share) * place[2]
+            _compose(last, place[3], place[4], place[5])
+    return out[:count]
+
+
+@njit(cache=True, error_model="numpy")
+def fit(candidate: Array, now: float, spread: float) -> Array:
+    """Position and velocity of a confirmed candidate now: weighted least squares over its hits.
+
+    Axis by axis, with a Gaussian prior of zero mean on the velocity.
+
+    Parameters
+    ----------
+    candidate : (2 + 6 h,) float64 array
+        As in `follow`.
+    now : float [s]
+    spread : float [m/s]
+        Standard deviation of the prior.
+
+    Returns
+    -------
+    (2, 5) float64 array
+        Per axis position [m], velocity [m/s], and their covariance pp, pv, vv.
+    """
+    out = np.empty((2, 5))
+    for axis in range(2):
+        a, b, d, u, v = 0.0, 0.0, 1.0 / (spread * spread), 0.0, 0.0
+        anchor = candidate[3 + axis]
+        for i in range(int(candidate[0])):
+            hit = candidate[2 + 6 * i : 8 + 6 * i]
+            tau, information = hit[0] - now, 1.0 / hit[3 + 2 * axis]
+            a += information
+            b += information * tau
+            d += information * tau * tau
+            u += information * (hit[1 + axis] - anchor)
+            v += information * tau * (hit[1 + axis] - anchor)
+        det = a * d - b * b
+        out[axis, 0] = anchor + (d * u - b * v) / det
+        out[axis, 1] = (a * v - b * u) / det
+        out[axis, 2], out[axis, 3], out[axis, 4] = d / det, -b / det, a / det
+    return out
+
+
+def warm() -> None:
+    """Compile (or load) every kernel here with the types used in flight."""
+    sightings = np.array([[0.0, 1.0, 1.0, 1.0, 0.0, 1.0], [0.0, 1.5, 1.0, 1.0, 0.0, 1.0]])
+    places = propose(sightings, 2.0, 3)
+    candidates = follow(np.zeros((0, 20)), places, 4.0, 3.0)
+    fit(candidates[0], 1.0, 2.0)

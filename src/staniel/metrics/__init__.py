@@ -1,0 +1,18 @@
+"""Figures of a run, computed from its record: per vehicle, per aircraft, for the team."""
+
+from staniel.metrics.compute import compute_metrics
+from staniel.metrics.flown import EXPOSURE_RANGE
+from staniel.metrics.following import GATE
+from staniel.metrics.gospa import CUTOFF, ORDER, Gospa, gospa
+from staniel.metrics.picture import team_picture
+
+__all__ = [
+    "CUTOFF",
+    "EXPOSURE_RANGE",
+    "GATE",
+    "ORDER",
+    "Gospa",
+    "compute_metrics",
+    "gospa",
+    "team_picture",
+]

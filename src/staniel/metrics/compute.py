@@ -1,0 +1,53 @@
+"""All figures of a run, from its record alone."""
+
+from typing import Any
+
+from staniel.metrics.flown import aircraft_metrics
+from staniel.metrics.following import follow
+from staniel.metrics.targets import target_metrics
+from staniel.metrics.team import team_metrics
+from staniel.metrics.visible import visible_samples
+from staniel.record import Record
+
+__all__ = ["compute_metrics"]
+
+_DIGITS = 6
+
+
+def compute_metrics(record: Record) -> dict[str, Any]:
+    """The metrics of a run: a pure function of its record.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    dict
+        Ready for JSON: strings, booleans, integers, finite floats rounded to six decimals, and None
+        where a figure is undefined. Keys ``scenario`` (its name), ``seed``, ``version``,
+        ``duration``, ``complete``, ``targets``, ``aircraft`` and ``team``; every figure is defined
+        in ``docs/metrics.md``.
+    """
+    following = follow(record)
+    targets = target_metrics(record, following, visible_samples(record))
+    metrics = {
+        "scenario": record.scenario.get("name"),
+        "seed": record.scenario.get("seed"),
+        "version": record.version,
+        "duration": float(record.times[-1]) if len(record.times) else 0.0,
+        "complete": bool(record.complete),
+        "targets": targets,
+        "aircraft": aircraft_metrics(record),
+        "team": team_metrics(record, following, targets),
+    }
+    rounded: dict[str, Any] = _rounded(metrics)
+    return rounded
+
+
+def _rounded(value: Any) -> Any:  # noqa: ANN401 -- walks whatever JSON can hold
+    if isinstance(value, dict):
+        return {key: _rounded(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_rounded(inner) for inner in value]
+    return round(value, _DIGITS) if isinstance(value, float) else value

@@ -1,0 +1,84 @@
+"""What the team did together: its picture of the whole, what it agreed and what it said."""
+
+import itertools
+import statistics
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.metrics.following import Following
+from staniel.record import Record
+
+__all__ = ["handovers", "team_metrics"]
+
+
+def team_metrics(
+    record: Record, following: Following, targets: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """The figures of the whole team, see ``docs/metrics.md``; None where one is undefined.
+
+    Parameters
+    ----------
+    record : Record
+    following : Following
+    targets : list of dict
+        Of `target_metrics`.
+
+    Returns
+    -------
+    dict
+    """
+    messages = record.messages
+    awards = messages[messages["kind"] == "award"]
+    means = following.gospa.mean(axis=0).tolist() if len(following.gospa) else [None] * 4
+    names = ("gospa_mean", "gospa_localisation", "gospa_missed", "gospa_false")
+    # A vehicle that was never detected was visible and tracked for nothing of the time.
+    visible = [target["visible_fraction"] or 0.0 for target in targets]
+    tracked = [target["tracked_fraction"] or 0.0 for target in targets]
+    return {
+        **dict(zip(names, means, strict=True)),
+        "visible_fraction": statistics.fmean(visible) if visible else None,
+        "tracked_fraction": statistics.median(tracked) if tracked else None,
+        "identity_switches": sum(target["identity_switches"] for target in targets),
+        "tracks_started": following.tracks_started,
+        "false_tracks": following.false_tracks,
+        "auctions": len(set(awards[["target", "sender", "sequence"]].tolist())),
+        "handovers": handovers(record.decisions),
+        "messages_sent": len(messages),
+        "messages_delivered": int(messages["heard"].sum()),
+        "messages_possible": int(messages["receivers"].sum()),
+    }
+
+
+def handovers(decisions: NDArray[np.void]) -> int:
+    """How often responsibility for a target went from one living aircraft to another.
+
+    The holder of a target is the aircraft that names it as its own. While two name it, the one that
+    held it before is still the holder; while nobody does, the last one is remembered.
+
+    Parameters
+    ----------
+    decisions : (n,) array of `staniel.record.DECISION_DTYPE`
+        In the order of time; an aircraft that no longer decides has no rows.
+
+    Returns
+    -------
+    int
+    """
+    times = decisions["time"]
+    bounds = [0, *(np.flatnonzero(np.diff(times)) + 1).tolist(), len(times)]
+    agents, targets = decisions["agent"].tolist(), decisions["target"].tolist()
+    holder_of: dict[str, int] = {}
+    count = 0
+    for first, last in itertools.pairwise(bounds):
+        claims: dict[str, list[int]] = {}
+        for target, agent in zip(targets[first:last], agents[first:last], strict=True):
+            if target:
+                claims.setdefault(target, []).append(agent)
+        for target, claimants in claims.items():
+            holder = holder_of.get(target)
+            if holder not in claimants:
+                count += holder is not None and holder in agents[first:last]
+                holder_of[target] = min(claimants)
+    return count

@@ -1,0 +1,93 @@
+"""When each vehicle is truly visible to the team, and the gaps in between."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.kernels.visibility import seen_by
+from staniel.record import Record
+
+__all__ = ["gaps", "sample_step", "since", "visible_samples", "whole_seconds"]
+
+Floats = NDArray[np.float64]
+
+_CLOSE = 1e-6  # instants this near to each other are one [s]
+
+
+def visible_samples(record: Record) -> NDArray[np.bool_]:
+    """When each vehicle is in a footprint, in range and in free sight of at least one aircraft.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    (m, n_vehicles) bool array
+        At ``record.fine_times``.
+    """
+    camera = record.scenario["camera"]
+    counts = seen_by(
+        record.city.walls,
+        np.ascontiguousarray(record.fine_aircraft, dtype=np.float64),
+        np.ascontiguousarray(record.fine_vehicles, dtype=np.float64),
+        float(camera["target_height"]),
+        math.radians(camera["half_aperture_deg"]),
+        float(camera["range"]),
+    )
+    return counts > 0
+
+
+def whole_seconds(times: Floats) -> NDArray[np.intp]:
+    """Index of the first sample of each second.
+
+    Parameters
+    ----------
+    times : (m,) float array [s]
+        Ascending.
+
+    Returns
+    -------
+    (k,) int array
+
+    Examples
+    --------
+    >>> whole_seconds(np.array([0.0, 0.4, 0.8, 1.2, 1.6, 2.0]))
+    array([0, 3, 5])
+    """
+    return np.unique(np.floor(times + _CLOSE), return_index=True)[1]
+
+
+def since(times: Floats, start: float) -> NDArray[np.bool_]:
+    """Which instants lie at or after `start`, (m,) bool array."""
+    return times >= start - _CLOSE
+
+
+def sample_step(times: Floats) -> float:
+    """Seconds that one sample stands for: the usual distance between two, 0 with fewer than two."""
+    return float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+
+
+def gaps(visible: NDArray[np.bool_], step: float) -> list[float]:
+    """Length of each maximal run of samples without visibility.
+
+    Parameters
+    ----------
+    visible : (m,) bool array
+    step : float [s]
+        What one sample stands for.
+
+    Returns
+    -------
+    list of float [s]
+        In the order of time.
+
+    Examples
+    --------
+    >>> gaps(np.array([False, False, True, False]), 0.5)
+    [1.0, 0.5]
+    """
+    change = np.diff(np.concatenate(([0], (~visible).astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1)
+    return [int(length) * step for length in ends - starts]

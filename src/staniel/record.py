@@ -1,0 +1,117 @@
+"""What one tick and one run hold: the frame that is recorded, the record that is read back."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.city import City
+from staniel.datatypes.belief import Belief, Percept
+from staniel.datatypes.command import Command
+from staniel.datatypes.message import Delivery
+from staniel.datatypes.truth import Truth
+
+__all__ = [
+    "COMMAND_DTYPE",
+    "DECISION_DTYPE",
+    "MESSAGE_DTYPE",
+    "SIGHTING_DTYPE",
+    "TRACK_DTYPE",
+    "Frame",
+    "Record",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One tick: what was so, what was perceived, said, believed and commanded.
+
+    Truth and origins are here for the recorder, the metrics and a marked debug overlay, for nobody
+    else.
+
+    Attributes
+    ----------
+    truth : Truth
+    percepts : sequence of Percept
+        One an aircraft.
+    origins : sequence of tuple of int
+        Per percept and sighting the vehicle that caused it, -1 for a false alarm.
+    deliveries : sequence of Delivery
+        The messages that arrived in this tick, or were lost on the way to it.
+    commands : sequence of Command
+        Decided in this tick, one an aircraft.
+    beliefs : sequence of Belief
+        After this tick, one an aircraft.
+    """
+
+    truth: Truth
+    percepts: Sequence[Percept]
+    origins: Sequence[tuple[int, ...]]
+    deliveries: Sequence[Delivery]
+    commands: Sequence[Command]
+    beliefs: Sequence[Belief]
+
+
+def _columns(text: str) -> np.dtype[np.void]:
+    """Structured type from ``"name:format ..."``."""
+    return np.dtype([tuple(column.split(":")) for column in text.split()])
+
+
+SIGHTING_DTYPE = _columns("time:f8 reporter:i4 x:f8 y:f8 cxx:f8 cxy:f8 cyy:f8 origin:i4")
+TRACK_DTYPE = _columns(
+    "time:f8 agent:i4 id:U16 x:f8 y:f8 vx:f8 vy:f8 cxx:f8 cxy:f8 cyy:f8 existence:f8 last_seen:f8"
+)
+MESSAGE_DTYPE = _columns(
+    "time:f8 sender:i4 sequence:i8 kind:U12 target:U16 winner:i4 cost:f8 x:f8 y:f8 "
+    "receivers:i4 heard:i4"
+)
+COMMAND_DTYPE = _columns(
+    "time:f8 agent:i4 kind:U8 ax:f8 ay:f8 bx:f8 by:f8 radius:f8 turn:i4 speed:f8 altitude:f8"
+)
+DECISION_DTYPE = _columns("time:f8 agent:i4 role:U8 target:U16 goal_x:f8 goal_y:f8")
+
+
+@dataclass(frozen=True)
+class Record:
+    """A whole run in memory, as plain arrays. Times in seconds, everything else as in `Truth`.
+
+    Attributes
+    ----------
+    scenario : mapping
+        The resolved scenario, seed included.
+    version : str
+        Of staniel, that wrote it.
+    city : City
+        The true one.
+    times : (n,) float array
+        Decision instants.
+    aircraft : (n, n_aircraft, 6) float array
+    vehicles : (n, n_vehicles, 4) float array
+    fine_times : (m,) float array
+        Instants at 0.2 s, or at the dynamics step where that is longer.
+    fine_aircraft : (m, n_aircraft, 6) float array
+    fine_vehicles : (m, n_vehicles, 4) float array
+    sightings, tracks, messages, commands, decisions : structured arrays
+        In the order of time; see the ``_DTYPE`` constants. In `messages`, `target` is empty and
+        `winner` -1 where a kind has none; `x`, `y` and `cost` are NaN there.
+    complete : bool
+        False when the run was cut short.
+    """
+
+    scenario: Mapping[str, Any]
+    version: str
+    city: City
+    times: NDArray[np.float64]
+    aircraft: NDArray[np.float64]
+    vehicles: NDArray[np.float64]
+    fine_times: NDArray[np.float64]
+    fine_aircraft: NDArray[np.float64]
+    fine_vehicles: NDArray[np.float64]
+    sightings: NDArray[np.void]
+    tracks: NDArray[np.void]
+    messages: NDArray[np.void]
+    commands: NDArray[np.void]
+    decisions: NDArray[np.void]
+    complete: bool
