@@ -166,10 +166,9 @@ class Agent:
                 return command, "recover", place
             self._last_place = None
         others = [message.goal for message in heartbeats if message.role == "search"]
-        goal = self._search.goal(time, pose, others)
+        start, goal = self._search.leg(time, pose, others)
         airframe = self._briefing.airframe
-        line = FlyLine((pose.x, pose.y), goal, airframe.speed, airframe.altitude)
-        return line, "search", goal
+        return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
 
     def _pursuit(self, time: float, pose: Pose, track: TrackEstimate) -> Pursuit:
         briefing = self._briefing

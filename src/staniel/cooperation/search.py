@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from staniel.city import City
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.equipment import Airframe, Camera
+from staniel.datatypes.message import Point
 from staniel.kernels.search import choose, mark
 
 __all__ = ["SearchMap"]
@@ -46,6 +47,7 @@ class SearchMap:
         self._goal: tuple[int, int] | None = None
         self._chosen_at = -math.inf
         self._looked_at = -math.inf
+        self._start: Point = (0.0, 0.0)
 
     @property
     def ages(self) -> NDArray[np.float64]:
@@ -68,10 +70,11 @@ class SearchMap:
             time,
         )
 
-    def goal(
-        self, time: float, pose: Pose, others: Sequence[tuple[float, float]]
-    ) -> tuple[float, float]:
-        """Where to fly to look: kept until it was looked at, or for `PATIENCE`.
+    def leg(self, time: float, pose: Pose, others: Sequence[Point]) -> tuple[Point, Point]:
+        """The straight leg to fly to look: kept until its goal was looked at, or for `PATIENCE`.
+
+        It begins where the aircraft was when it chose: a leg from where it is now would have it
+        circle for ever round a goal that is nearer than it can turn.
 
         Parameters
         ----------
@@ -82,31 +85,29 @@ class SearchMap:
 
         Returns
         -------
-        (float, float) [m]
-            The middle of the city, if it has no streets at all.
+        start, goal : (float, float) [m]
+            The goal is the middle of the city, if it has no streets at all.
         """
-        if self._goal is not None and time - self._chosen_at < PATIENCE:
-            kept = self._goal
-            if self._looked[kept] < self._chosen_at:
-                return self._place(kept)
-        self._goal = choose(
-            self._looked,
-            self._places,
-            np.array(pose),
-            self._airframe.min_turn_radius,
-            np.array(others, dtype=np.float64).reshape(-1, 2),
-            SPACING,
-            time,
-        )
-        self._chosen_at = time
-        return self._place(self._goal)
+        done = self._goal is None or self._looked[self._goal] >= self._chosen_at
+        if done or time - self._chosen_at >= PATIENCE:
+            self._goal = choose(
+                self._looked,
+                self._places,
+                np.array(pose),
+                self._airframe.min_turn_radius,
+                np.array(others, dtype=np.float64).reshape(-1, 2),
+                SPACING,
+                time,
+            )
+            self._chosen_at, self._start = time, (pose.x, pose.y)
+        return self._start, self._place(self._goal)
 
     def forget_goal(self) -> None:
         """Choose anew next time: the aircraft was elsewhere in between."""
         self._goal = None
 
-    def _place(self, index: tuple[int, int]) -> tuple[float, float]:
-        if index[0] < 0:
+    def _place(self, index: tuple[int, int] | None) -> Point:
+        if index is None or index[0] < 0:
             return self._chart.size[0] / 2.0, self._chart.size[1] / 2.0
         return float(self._places[index][0]), float(self._places[index][1])
 
