@@ -1,0 +1,276 @@
+"""JSON text of a record into arrays; whatever is not as the schemas say is refused."""
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.city import City
+from staniel.datatypes.truth import AIRCRAFT_COLUMNS, VEHICLE_COLUMNS
+from staniel.errors import CityError, RecordError
+from staniel.record import (
+    COMMAND_DTYPE,
+    DECISION_DTYPE,
+    MESSAGE_DTYPE,
+    SIGHTING_DTYPE,
+    TRACK_DTYPE,
+    Record,
+)
+from staniel.recording.schemas import FORMAT, TICK_TOPICS
+
+__all__ = ["Contents", "decode"]
+
+Floats = NDArray[np.float64]
+Row = tuple[Any, ...]
+
+_LARGEST: Final = 1e12
+"""Numbers of this size and beyond are refused: sums and differences of them would overflow."""
+
+_MALFORMED: Final = (TypeError, ValueError, LookupError, OverflowError, AttributeError)
+"""What values of an unexpected type or shape raise on their way into arrays."""
+
+
+@dataclass
+class Contents:
+    """What a file holds, not decoded yet: the JSON text of each message.
+
+    Attributes
+    ----------
+    channels : dict of int to str
+        Topic by channel.
+    once : dict of str to bytes
+        Text of the messages that come once, by topic.
+    ticks : dict of int to dict of str to bytes
+        Texts by tick and topic.
+    complete : bool
+        The file says that its run was not cut short.
+    """
+
+    channels: dict[int, str] = field(default_factory=dict)
+    once: dict[str, bytes] = field(default_factory=dict)
+    ticks: dict[int, dict[str, bytes]] = field(default_factory=dict)
+    complete: bool = False
+
+
+def decode(contents: Contents) -> Record:
+    """Decode a whole record.
+
+    Raises
+    ------
+    RecordError
+        No scenario, city or whole tick, another format, or contents that are not what the schemas
+        say.
+    """
+    version, scenario = _about(contents)
+    city = _city(contents)
+    ticks = _whole_ticks(contents.ticks)
+    truth = [entry for _, entry in _entries(ticks, "truth")]
+    return Record(
+        scenario=scenario,
+        version=version,
+        city=city,
+        **_poses(truth),
+        sightings=_table(ticks, "sightings", SIGHTING_DTYPE, _sighting),
+        tracks=_table(ticks, "tracks", TRACK_DTYPE, _track),
+        messages=_table(ticks, "messages", MESSAGE_DTYPE, _message, ("cost", "x", "y")),
+        commands=_table(ticks, "commands", COMMAND_DTYPE, _command, _PATH_COLUMNS),
+        decisions=_table(ticks, "decisions", DECISION_DTYPE, _decision),
+        complete=contents.complete,
+    )
+
+
+def _about(contents: Contents) -> tuple[str, dict[str, Any]]:
+    about = _once(contents, "/staniel/scenario")
+    if about.get("format") != FORMAT:
+        raise RecordError(f"format is {about.get('format')!r}, this staniel reads format {FORMAT}")
+    version, scenario = about.get("version"), about.get("scenario")
+    if not isinstance(version, str) or not isinstance(scenario, dict):
+        raise RecordError("/staniel/scenario: expected a version and a scenario")
+    return version, scenario
+
+
+def _city(contents: Contents) -> City:
+    try:
+        return City.from_dict(_once(contents, "/staniel/city"))
+    except CityError as error:
+        raise RecordError(f"/staniel/city: {error}") from error
+
+
+def _once(contents: Contents, topic: str) -> dict[str, Any]:
+    text = contents.once.get(topic)
+    if text is None:
+        raise RecordError(
+            f"holds no {topic}: not a record of staniel's, or cut off at its beginning"
+        )
+    return _json(text, topic)
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not JSON")
+
+
+_DECODER: Final = json.JSONDecoder(parse_constant=_refuse_constant)
+
+
+def _json(text: bytes, topic: str) -> dict[str, Any]:
+    try:
+        value = _DECODER.decode(text.decode())
+    except (ValueError, RecursionError) as error:
+        raise RecordError(f"{topic}: not JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise RecordError(f"{topic}: expected a JSON object, got {type(value).__name__}")
+    return value
+
+
+def _whole_ticks(ticks: Mapping[int, Mapping[str, bytes]]) -> dict[int, Mapping[str, bytes]]:
+    """The ticks from the first on that have all their messages, up to the first gap."""
+    whole: dict[int, Mapping[str, bytes]] = {}
+    first = min(ticks, default=0)
+    while len(ticks.get(first + len(whole), ())) == len(TICK_TOPICS):
+        whole[first + len(whole)] = ticks[first + len(whole)]
+    if not whole:
+        raise RecordError("holds no whole tick: the run was cut off before its first one ended")
+    return whole
+
+
+def _entries(
+    ticks: Mapping[int, Mapping[str, bytes]], kind: str
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    topic = f"/staniel/{kind}"
+    for tick, texts in ticks.items():
+        yield tick, _json(texts[topic], f"{topic}, tick {tick}")
+
+
+def _poses(truth: Sequence[Mapping[str, Any]]) -> dict[str, Floats]:
+    """Everything of a record that comes from the truth, by the record's field."""
+    where = "/staniel/truth"
+    try:
+        times = [entry["time"] for entry in truth]
+        aircraft = [[[a[c] for c in AIRCRAFT_COLUMNS] for a in e["aircraft"]] for e in truth]
+        vehicles = [[[v[c] for c in VEHICLE_COLUMNS] for v in e["vehicles"]] for e in truth]
+        fine = [entry["fine"] for entry in truth]
+        fine_times = [time for part in fine for time in part["times"]]
+        fine_aircraft = [pose for part in fine for pose in part["aircraft"]]
+        fine_vehicles = [pose for part in fine for pose in part["vehicles"]]
+        n, m = len(times), len(fine_times)
+        n_aircraft, n_vehicles = len(aircraft[0]), len(vehicles[0])
+        poses = {
+            "times": _floats(times, (n,)),
+            "aircraft": _floats(aircraft, (n, n_aircraft, 6)),
+            "vehicles": _floats(vehicles, (n, n_vehicles, 4)),
+            "fine_times": _floats(fine_times, (m,)),
+            "fine_aircraft": _floats(fine_aircraft, (m, n_aircraft, 6)),
+            "fine_vehicles": _floats(fine_vehicles, (m, n_vehicles, 4)),
+        }
+    except _MALFORMED as error:
+        raise _malformed(where, error) from error
+    for name in ("times", "fine_times"):
+        if np.any(np.diff(poses[name]) <= 0.0):
+            raise RecordError(f"{where}: {name} do not increase")
+    return poses
+
+
+def _floats(values: Sequence[Any], shape: tuple[int, ...]) -> Floats:
+    array = np.asarray(values, dtype=np.float64)
+    if array.size == 0 == math.prod(shape) and len(values) == shape[0]:
+        return np.zeros(shape)
+    if array.shape != shape:
+        raise ValueError(f"got the shape {array.shape}, expected {shape}")
+    if not (np.abs(array) < _LARGEST).all():
+        raise ValueError("got a number that is not finite, or too large")
+    return array
+
+
+def _malformed(where: str, error: Exception) -> RecordError:
+    reason = f"lacks {error}" if isinstance(error, KeyError) else str(error)
+    return RecordError(f"{where}: not what its schema says ({reason})")
+
+
+def _table(
+    ticks: Mapping[int, Mapping[str, bytes]],
+    kind: str,
+    dtype: np.dtype[np.void],
+    row: Callable[[float, Mapping[str, Any]], Row],
+    may_lack: Sequence[str] = (),
+) -> NDArray[np.void]:
+    """All rows of one kind; `may_lack` names the float columns where null stands for NaN."""
+    rows: list[Row] = []
+    where = f"/staniel/{kind}"
+    try:
+        for _, entry in _entries(ticks, kind):
+            time = entry["time"]
+            rows += [row(time, item) for item in entry[kind]]
+        table = np.array(rows, dtype=dtype)
+    except RecordError:
+        raise
+    except _MALFORMED as error:
+        raise _malformed(where, error) from error
+    for name in dtype.names or ():
+        if dtype[name].kind == "f":
+            good = np.abs(table[name]) < _LARGEST
+            if name in may_lack:
+                good |= np.isnan(table[name])
+            if not good.all():
+                raise RecordError(f"{where}: {name} has a number that is not finite, or too large")
+    return table
+
+
+def _text(value: Any, longest: int) -> str:  # noqa: ANN401
+    """A text that fits its column; null is the empty text."""
+    if value is None:
+        return ""
+    if not isinstance(value, str) or len(value) > longest:
+        raise ValueError(f"{str(value)[:40]!r} is not a text of up to {longest} characters")
+    return value
+
+
+def _sighting(_: float, item: Mapping[str, Any]) -> Row:
+    return (
+        item["time"], item["reporter"], item["x"], item["y"],
+        item["cxx"], item["cxy"], item["cyy"], item["origin"],
+    )  # fmt: skip
+
+
+def _track(_: float, item: Mapping[str, Any]) -> Row:
+    return (
+        item["time"], item["agent"], _text(item["id"], 16),
+        item["x"], item["y"], item["vx"], item["vy"],
+        item["cxx"], item["cxy"], item["cyy"], item["existence"], item["last_seen"],
+    )  # fmt: skip
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _message(_: float, item: Mapping[str, Any]) -> Row:
+    winner = item["winner"]
+    return (
+        item["time"], item["sender"], item["sequence"], _text(item["kind"], 12),
+        _text(item["target"], 16), -1 if winner is None else winner, _or_nan(item["cost"]),
+        _or_nan(item["x"]), _or_nan(item["y"]), item["receivers"], len(item["heard_by"]),
+    )  # fmt: skip
+
+
+_PATH_COLUMNS: Final = ("ax", "ay", "bx", "by", "radius")
+_NOWHERE: Final = (math.nan, math.nan)
+
+
+def _command(time: float, item: Mapping[str, Any]) -> Row:
+    kind = _text(item["kind"], 8)
+    a, b, radius, turn = _NOWHERE, _NOWHERE, math.nan, 0
+    if kind == "line":
+        a, b = item["start"], item["end"]
+    elif kind == "orbit":
+        a, radius, turn = item["center"], item["radius"], item["turn"]
+    (ax, ay), (bx, by) = a, b
+    return time, item["agent"], kind, ax, ay, bx, by, radius, turn, item["speed"], item["altitude"]
+
+
+def _decision(time: float, item: Mapping[str, Any]) -> Row:
+    x, y = item["goal"]
+    return time, item["agent"], _text(item["role"], 8), _text(item["target"], 16), x, y

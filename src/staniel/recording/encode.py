@@ -1,0 +1,227 @@
+"""One tick as JSON text, a message a channel: metres to 1 mm, angles to 1e-4 rad, times to 1 µs.
+
+The texts are formatted by hand: printf-style formatting of a whole array costs half of what
+rounding it and `json.dumps` cost, and a tick has some 700 numbers.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.datatypes.belief import Belief, Percept
+from staniel.datatypes.clock import Clock
+from staniel.datatypes.command import Command, FlyLine, FlyOrbit
+from staniel.datatypes.message import (
+    Announce,
+    Award,
+    Bid,
+    Delivery,
+    Heartbeat,
+    Message,
+    Release,
+    Revoke,
+)
+from staniel.datatypes.truth import Truth
+from staniel.record import Frame
+
+__all__ = ["FINE_STEP", "FineSteps", "encode_tick"]
+
+FINE_STEP: Final = 0.2
+"""Longest time between two fine poses [s], unless a dynamics step is longer."""
+
+_AIRCRAFT_ROW = "[%.3f,%.3f,%.3f,%.4f,%.4f,%.3f]"
+_VEHICLE_ROW = "[%.3f,%.3f,%.4f,%.3f]"
+_AIRCRAFT = '{"id":%d,"x":%%.3f,"y":%%.3f,"z":%%.3f,"heading":%%.4f,"bank":%%.4f,"speed":%%.3f}'
+_VEHICLE = '{"id":%d,"x":%%.3f,"y":%%.3f,"heading":%%.4f,"speed":%%.3f}'
+_SIGHTING = (
+    '{"time":%s,"reporter":%d,"x":%.3f,"y":%.3f,"cxx":%.6g,"cxy":%.6g,"cyy":%.6g,"origin":%d}'
+)
+_TRACK = (
+    '{"agent":%d,"id":"%s","time":%s,"x":%.3f,"y":%.3f,"vx":%.3f,"vy":%.3f,'
+    '"cxx":%.6g,"cxy":%.6g,"cyy":%.6g,"existence":%.4f,"last_seen":%s}'
+)
+_MESSAGE = (
+    '{"time":%s,"sender":%d,"sequence":%d,"kind":"%s","target":%s,"winner":%s,"cost":%s,'
+    '"x":%s,"y":%s,"receivers":%d,"heard_by":[%s]}'
+)
+_LINE = (
+    '{"agent":%d,"kind":"line","start":[%.3f,%.3f],"end":[%.3f,%.3f],"speed":%.3f,"altitude":%.3f}'
+)
+_ORBIT = (
+    '{"agent":%d,"kind":"orbit","center":[%.3f,%.3f],"radius":%.3f,"turn":%d,"speed":%.3f,'
+    '"altitude":%.3f}'
+)
+_BANKS = '{"agent":%d,"kind":"banks","banks":[%s],"hold":%s,"speed":%.3f,"altitude":%.3f}'
+_DECISION = '{"agent":%d,"role":"%s","target":%s,"goal":[%.3f,%.3f]}'
+
+
+class FineSteps:
+    """Which dynamics substeps of a tick are recorded as fine poses, and when they were.
+
+    Every `stride`-th substep, the last one included: the longest stride that stays within
+    `FINE_STEP` and divides a decision step evenly.
+    """
+
+    def __init__(self, clock: Clock) -> None:
+        longest = max(1, math.floor(FINE_STEP / clock.dynamics_step + 1e-9))
+        self.stride = max(n for n in range(1, longest + 1) if clock.substeps % n == 0)
+        self._step = clock.dynamics_step * self.stride
+
+    def times(self, end: float, count: int) -> list[float]:
+        """Instants of the last `count` fine poses of the tick that ends at `end` [s]."""
+        return [round(end - self._step * back, 6) for back in range(count - 1, -1, -1)]
+
+    def of(self, path: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Fine poses in a path of all substeps, (n_substeps, n, columns); the start has one."""
+        return path[(len(path) - 1) % self.stride :: self.stride]
+
+
+def encode_tick(frame: Frame, fine: FineSteps) -> list[tuple[str, str]]:
+    """Encode the messages of one tick.
+
+    Returns
+    -------
+    list of (str, str)
+        Topic and JSON text, one for each of `schemas.TICK_TOPICS`.
+    """
+    head = f'{{"tick":{frame.truth.tick},"time":{_time(frame.truth.time)},'
+    rows = {
+        "sightings": _sightings(frame.percepts, frame.origins),
+        "tracks": _tracks(frame.beliefs),
+        "messages": [_message(delivery) for delivery in frame.deliveries],
+        "commands": [_command(agent, command) for agent, command in enumerate(frame.commands)],
+        "decisions": [_decision(agent, belief) for agent, belief in enumerate(frame.beliefs)],
+    }
+    texts = [("/staniel/truth", f"{head}{_truth(frame.truth, fine)}}}")]
+    texts += [
+        (f"/staniel/{kind}", f'{head}"{kind}":[{",".join(items)}]}}')
+        for kind, items in rows.items()
+    ]
+    return texts
+
+
+def _time(seconds: float) -> str:
+    return repr(round(float(seconds), 6))
+
+
+def _truth(truth: Truth, fine: FineSteps) -> str:
+    aircraft_path, vehicle_path = fine.of(truth.aircraft_path), fine.of(truth.vehicle_path)
+    aircraft = _fill(_objects(_AIRCRAFT, len(truth.aircraft)), truth.aircraft)
+    vehicles = _fill(_objects(_VEHICLE, len(truth.vehicles)), truth.vehicles)
+    times = ",".join(map(repr, fine.times(truth.time, len(aircraft_path))))
+    fine_aircraft = _fill(_nested(_AIRCRAFT_ROW, *aircraft_path.shape[:2]), aircraft_path)
+    fine_vehicles = _fill(_nested(_VEHICLE_ROW, *vehicle_path.shape[:2]), vehicle_path)
+    return (
+        f'"aircraft":{aircraft},"vehicles":{vehicles},"fine":{{"times":[{times}],'
+        f'"aircraft":{fine_aircraft},"vehicles":{fine_vehicles}}}'
+    )
+
+
+def _fill(template: str, values: NDArray[np.float64]) -> str:
+    return template % tuple(values.ravel().tolist())
+
+
+@cache
+def _objects(row: str, count: int) -> str:
+    return f"[{','.join(row % identity for identity in range(count))}]"
+
+
+@cache
+def _nested(row: str, steps: int, count: int) -> str:
+    step = f"[{','.join([row] * count)}]"
+    return f"[{','.join([step] * steps)}]"
+
+
+def _sightings(percepts: Sequence[Percept], origins: Sequence[tuple[int, ...]]) -> list[str]:
+    rows = []
+    for agent, (percept, causes) in enumerate(zip(percepts, origins, strict=True)):
+        for sighting, origin in zip(percept.sightings, causes, strict=True):
+            x, y = sighting.position.tolist()
+            (cxx, cxy), (_, cyy) = sighting.covariance.tolist()
+            rows.append(_SIGHTING % (_time(sighting.time), agent, x, y, cxx, cxy, cyy, origin))
+    return rows
+
+
+def _tracks(beliefs: Sequence[Belief]) -> list[str]:
+    rows = []
+    for agent, belief in enumerate(beliefs):
+        for track in belief.tracks:
+            (cxx, cxy), (_, cyy) = track.covariance.tolist()
+            rows.append(
+                _TRACK
+                % (
+                    agent,
+                    track.id,
+                    _time(track.time),
+                    *track.position.tolist(),
+                    *track.velocity.tolist(),
+                    cxx,
+                    cxy,
+                    cyy,
+                    track.existence,
+                    _time(track.last_seen),
+                )
+            )
+    return rows
+
+
+def _name(track: object | None) -> str:
+    return "null" if track is None else f'"{track}"'
+
+
+def _metres(value: float) -> str:
+    return f"{value:.3f}" if math.isfinite(value) else "null"
+
+
+def _message(delivery: Delivery) -> str:
+    message = delivery.message
+    target, winner, cost, x, y = _contents(message)
+    return _MESSAGE % (
+        _time(message.time),
+        message.sender,
+        message.sequence,
+        message.kind,
+        _name(target),
+        "null" if winner is None else winner,
+        _metres(cost),
+        _metres(x),
+        _metres(y),
+        delivery.receivers,
+        ",".join(map(str, delivery.heard_by)),
+    )
+
+
+def _contents(message: Message) -> tuple[object | None, int | None, float, float, float]:
+    """Target, winner, cost and position of a message; None and NaN where its kind has none."""
+    match message:
+        case Heartbeat(pose=pose, target=target, cost=cost):
+            return target, None, cost, pose.x, pose.y
+        case Award(target=target, position=(x, y), winner=winner, cost=cost):
+            return target, winner, cost, x, y
+        case Announce(target=target, position=(x, y), cost=cost):
+            return target, None, cost, x, y
+        case Revoke(target=target, position=(x, y), cost=cost):
+            return target, None, cost, x, y
+        case Bid(target=target, cost=cost):
+            return target, None, cost, math.nan, math.nan
+        case Release(target=target, position=(x, y)):
+            return target, None, math.nan, x, y
+    return None, None, math.nan, math.nan, math.nan
+
+
+def _command(agent: int, command: Command) -> str:
+    flown = (command.speed, command.altitude)
+    if isinstance(command, FlyLine):
+        return _LINE % (agent, *command.start, *command.end, *flown)
+    if isinstance(command, FlyOrbit):
+        return _ORBIT % (agent, *command.center, command.radius, command.turn, *flown)
+    banks = ",".join(f"{bank:.4f}" for bank in command.banks)
+    return _BANKS % (agent, banks, _time(command.hold), *flown)
+
+
+def _decision(agent: int, belief: Belief) -> str:
+    return _DECISION % (agent, belief.role, _name(belief.target), *belief.goal)
