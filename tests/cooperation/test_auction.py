@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from staniel.cooperation import Allocation, CooperationConfig, Task
 from staniel.datatypes.belief import Pose, TrackId
 from staniel.datatypes.message import Announce, Award, Bid, Heartbeat, Release, Revoke
@@ -24,7 +25,11 @@ class Bus:
         self.sides = [
             Allocation(i, self.config, turn_radius=RADIUS, step=1.0) for i in range(len(poses))
         ]
-        self.targets, self.loss, self.rng = dict(enumerate(targets)), loss, np.random.default_rng(seed)
+        self.targets, self.loss, self.rng = (
+            dict(enumerate(targets)),
+            loss,
+            np.random.default_rng(seed),
+        )
         self.seers = seers or {k: set(range(len(poses))) for k in self.targets}
         # Each agent's own name for each target, which renames change.
         self.names = {
@@ -202,4 +207,6 @@ def test_every_target_gets_one_holder_in_spite_of_losses(agents, targets, loss, 
         bus.tick()
     assert max(counts) <= 1
     assert sum(counts) == min(agents, targets)
-    assert all(isinstance(m, Heartbeat | Announce | Award | Bid | Revoke | Release) for m in bus.log)
+    assert all(
+        isinstance(m, Heartbeat | Announce | Award | Bid | Revoke | Release) for m in bus.log
+    )

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from staniel.agent import Agent
 from staniel.city import City
 from staniel.datatypes.truth import Truth
@@ -9,7 +10,7 @@ from staniel.scenario import build_city, load_scenario
 from staniel.scenario.assemble import assemble
 
 
-class Poison(AssertionError):
+class PeekingError(AssertionError):
     """The truth was read by somebody who must not see it."""
 
 
@@ -21,13 +22,13 @@ def poisoned(monkeypatch):
 
     def read_truth(self, name):
         if state["thinking"]:
-            raise Poison(f"Truth.{name}")
+            raise PeekingError(f"Truth.{name}")
         state["reads"] += 1
         return plain_truth(self, name)
 
     def read_city(self, name):
         if state["thinking"] and self is state["true_city"]:
-            raise Poison(f"City.{name} of the world")
+            raise PeekingError(f"City.{name} of the world")
         return plain_city(self, name)
 
     def think(self, percept, inbox):
@@ -67,9 +68,9 @@ def test_the_poison_works(poisoned):
             return truth.vehicles
 
     poisoned["thinking"] = True
-    with pytest.raises(Poison, match=r"Truth\.vehicles"):
+    with pytest.raises(PeekingError, match=r"Truth\.vehicles"):
         Peeker().step(None, [])
-    with pytest.raises(Poison, match="of the world"):
+    with pytest.raises(PeekingError, match="of the world"):
         city.visible([[0.0, 0.0, 1.0]], [[1.0, 1.0, 1.0]])
     poisoned["thinking"] = False
 

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+
 import staniel
 from staniel.scenario import build_city
 from staniel.scenario.assemble import assemble
