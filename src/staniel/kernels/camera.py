@@ -15,7 +15,8 @@ __all__ = ["detect", "warm"]
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_VEHICLE, _ALARM, _PLACE, _ORDER = 0, 1, 2, 3  # sub-streams of one aircraft's look
+_VEHICLE, _ALARM, _PLACE, _ORDER = 0, 1, 2, 3  # streams of one aircraft's look
+_STREAMS = 4
 _DRAWS = 4  # counters of each vehicle in a look: one for the detection, two for the noise
 _MOST_TRIES = 1000
 
@@ -23,11 +24,12 @@ _MOST_TRIES = 1000
 @njit(cache=True, error_model="numpy")
 def _poisson(mean: float, stream: np.uint64) -> int:
     """One Poisson number: arrivals of unit rate counted up to `mean` (a sum of exponentials)."""
-    count, time = 0, -math.log(1.0 - uniform(stream, 0))
-    while time < mean:
-        count += 1
+    count, time = 0, 0.0
+    while True:
         time -= math.log(1.0 - uniform(stream, count))
-    return count
+        if time >= mean:
+            return count
+        count += 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -162,8 +164,8 @@ def detect(
     alarms = np.empty(n, dtype=np.int64)
     streams = np.empty(n, dtype=np.uint64)
     for i in range(n):
-        streams[i] = fold(fold(key, i), tick)
-        alarms[i] = _poisson(clutter, fold(streams[i], _ALARM))
+        streams[i] = fold(key, i)
+        alarms[i] = _poisson(clutter, fold(streams[i], _STREAMS * tick + _ALARM))
     most = 0
     for i in range(n):
         most += alarms[i]
@@ -174,7 +176,7 @@ def detect(
     k = 0
     for i in range(n):
         pose = aircraft[i]
-        stream = fold(streams[i], _VEHICLE)
+        stream = fold(streams[i], _STREAMS * tick + _VEHICLE)
         for j in range(m):
             if seen[i, j] and uniform(stream, _DRAWS * j) < chance:
                 x, y = points[j, 0], points[j, 1]
@@ -182,7 +184,7 @@ def detect(
                 _write(rows[k], pose, x, y, delta)
                 origins[k] = j
                 k += 1
-        stream = fold(streams[i], _PLACE)
+        stream = fold(streams[i], _STREAMS * tick + _PLACE)
         for a in range(alarms[i]):
             found, x, y = _somewhere(pose, half_aperture, reach, height, fold(stream, a))
             inside = 0.0 <= x <= walls.width and 0.0 <= y <= walls.height
@@ -191,7 +193,8 @@ def detect(
                 origins[k] = -1
                 k += 1
         first[i + 1] = k
-        _shuffle(rows, origins, first[i], k, fold(streams[i], _ORDER))
+        stream = fold(streams[i], _STREAMS * tick + _ORDER)
+        _shuffle(rows, origins, first[i], first[i + 1], stream)
     return rows[:k], origins[:k], first
 
 

@@ -341,8 +341,8 @@ def place(
         stream = fold(key, i)
         placed = False
         for k in range(tries):
-            x = walls.width * uniform(stream, 2 * k + 1)
-            y = walls.height * uniform(stream, 2 * k + 2)
+            x = walls.width * uniform(stream, 3 * k)
+            y = walls.height * uniform(stream, 3 * k + 1)
             row, column = min(int(y / spacing), rows - 1), min(int(x / spacing), columns - 1)
             if not street[row, column] or not disc_clear(walls, x, y, clearance):
                 continue
@@ -355,7 +355,7 @@ def place(
                     break
             if placed:
                 places[i, 0], places[i, 1] = x, y
-                places[i, 2] = math.pi * (1.0 - 2.0 * uniform(stream, 0))
+                places[i, 2] = math.pi * (1.0 - 2.0 * uniform(stream, 3 * k + 2))
                 break
         if not placed:
             return places[:i]

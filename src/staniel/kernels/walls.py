@@ -39,7 +39,7 @@ class Walls(NamedTuple):
 
     The grid covers the city's rectangle from the origin, row by row from the south; cell ``(i, j)``
     has the number ``j * nx + i``. All arrays are C-contiguous float64, whole numbers among them:
-    few arrays make a cheap argument, as each costs a kernel two counts of its references.
+    two arrays make a cheap argument, as a kernel counts references of each on every call.
     """
 
     width: float
@@ -58,17 +58,13 @@ class Walls(NamedTuple):
     """(m, 7) the walls of each cell in turn: x0, y0, x1, y1, roof height [m], `SKIN` x length
     [m^2], building."""
     cells: Floats
-    """(nx * ny + 1, 3) of each cell: its first row in `pieces`, the tallest roof with a wall in it
-    [m], the building over its south-west corner + 1 or 0."""
-    edges: Floats
-    """(w, 7) the walls of each building in turn, as in `pieces`."""
-    buildings: Floats
-    """(n + 1, 2) of each building: its first row in `edges`, roof height [m]."""
+    """(nx * ny + 1, 4) of each cell: its first row in `pieces`, the tallest roof with a wall in it
+    [m], the building over its south-west corner + 1 or 0, and that building's roof or 0 [m]."""
 
 
 @njit(cache=True, error_model="numpy")
 def _left_of(x0: float, y0: float, x1: float, y1: float, x: float, y: float) -> bool:
-    """Is the point left of the wall? On its line: is a point slightly east, then slightly north?"""
+    """Whether the point is left of the wall; on its line, a point slightly east, then north, is."""
     cross = (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)
     if cross != 0.0:
         return cross > 0.0
@@ -78,27 +74,28 @@ def _left_of(x0: float, y0: float, x1: float, y1: float, x: float, y: float) -> 
 
 
 @njit(cache=True, error_model="numpy")
-def inside(walls: Walls, x: float, y: float) -> int:
-    """Index of the building whose interior holds the point, -1 in the open or on a wall.
+def _over(walls: Walls, x: float, y: float) -> tuple[int, float]:
+    """Which building's interior holds the point and its roof; -1 and 0 in the open or on a wall.
 
     Walks from the cell's south-west corner, where the answer is known, north along the cell's edge
     and then east to the point, and toggles the building of each wall that is crossed on the way.
     """
     if not (0.0 <= x <= walls.width and 0.0 <= y <= walls.height):
-        return -1
+        return -1, 0.0
+    pieces, cells = walls.pieces, walls.cells
     i = min(int(x / walls.cell), walls.nx - 1)
     j = min(int(y / walls.cell), walls.ny - 1)
     west, south = i * walls.cell, j * walls.cell
     c = j * walls.nx + i
-    pieces, cells = walls.pieces, walls.cells
+    begin, end = int(cells[c, 0]), int(cells[c + 1, 0])
     here = int(cells[c, 2])
-    for k in range(int(cells[c, 0]), int(cells[c + 1, 0])):
+    for k in range(begin, end):
         x0, y0, x1, y1 = pieces[k, 0], pieces[k, 1], pieces[k, 2], pieces[k, 3]
         ex, ey, reach = x1 - x0, y1 - y0, pieces[k, 5]
         if abs(ex * (y - y0) - ey * (x - x0)) <= reach:
             along = ex * (x - x0) + ey * (y - y0)
             if -reach <= along <= ex * ex + ey * ey + reach:
-                return -1
+                return -1, 0.0
         over_point, over_edge = (y0 <= y) != (y1 <= y), (x0 <= west) != (x1 <= west)
         if over_point or over_edge:
             bend = _left_of(x0, y0, x1, y1, west, y)
@@ -107,52 +104,62 @@ def inside(walls: Walls, x: float, y: float) -> int:
                 crossed = not crossed
             if crossed:
                 here ^= int(pieces[k, 6]) + 1
-    return here - 1
+    if here == 0:
+        return -1, 0.0
+    for k in range(begin, end):
+        if int(pieces[k, 6]) == here - 1:
+            return here - 1, pieces[k, 4]
+    return here - 1, cells[c, 3]
 
 
 @njit(cache=True, error_model="numpy")
-def _next_touch(
-    walls: Walls, building: int, ax: float, ay: float, dx: float, dy: float, after: float
-) -> float:
-    """First parameter above `after` at which the ray a + t d meets a wall or corner, at most 1."""
-    edges = walls.edges
-    length = math.sqrt(dx * dx + dy * dy)
-    reach = SKIN * length
-    best = 1.0
-    for k in range(int(walls.buildings[building, 0]), int(walls.buildings[building + 1, 0])):
-        ux, uy = edges[k, 0] - ax, edges[k, 1] - ay
-        vx, vy = edges[k, 2] - ax, edges[k, 3] - ay
-        side_u = dx * uy - dy * ux
-        side_v = dx * vy - dy * vx
-        t = 2.0
-        if abs(side_u) <= reach:  # a corner on the ray's line
-            t = (ux * dx + uy * dy) / (length * length)
-        elif abs(side_v) > reach and (side_u > 0.0) != (side_v > 0.0):
-            share = side_u / (side_u - side_v)
-            t = ((ux + share * (vx - ux)) * dx + (uy + share * (vy - uy)) * dy) / (length * length)
-        if after < t < best:
-            best = t
-    return best
+def inside(walls: Walls, x: float, y: float) -> int:
+    """Index of the building whose interior holds the point, -1 in the open or on a wall."""
+    return _over(walls, x, y)[0]
 
 
 @njit(cache=True, error_model="numpy")
 def _enters(
-    walls: Walls, building: int, ax: float, ay: float, az: float, bx: float, by: float, bz: float
+    walls: Walls,
+    c: int,
+    first: float,
+    last: float,
+    ax: float,
+    ay: float,
+    az: float,
+    dx: float,
+    dy: float,
+    dz: float,
 ) -> bool:
-    """Does the segment enter this building's prism? The slow way, for rays that touch corners.
+    """Whether a + t d (dz >= 0) is inside a building for some t in (first, last), in cell `c`.
 
-    Between two neighbouring contacts with the outline the segment is wholly inside or outside: the
-    middle of the interval decides, and z, being linear, is lowest at one of its ends.
+    The slow way, for rays that touch corners or run along walls. Between two neighbouring contacts
+    with walls the ray is wholly inside or outside of each building: the middle decides, and the
+    height, growing with t, is lowest at the start.
     """
-    dx, dy, dz = bx - ax, by - ay, bz - az
-    roof = walls.buildings[building, 1] - SKIN
-    step = SKIN / math.sqrt(dx * dx + dy * dy)
-    start = 0.0
-    while start < 1.0:
-        end = _next_touch(walls, building, ax, ay, dx, dy, start + step)
+    pieces = walls.pieces
+    length = math.sqrt(dx * dx + dy * dy)
+    reach = SKIN * length
+    start = first
+    while start < last:
+        end = last
+        for k in range(int(walls.cells[c, 0]), int(walls.cells[c + 1, 0])):
+            ux, uy = pieces[k, 0] - ax, pieces[k, 1] - ay
+            vx, vy = pieces[k, 2] - ax, pieces[k, 3] - ay
+            side_u, side_v = dx * uy - dy * ux, dx * vy - dy * vx
+            if abs(side_u) <= reach:  # a corner on the ray's line; the next wall has it, too
+                contact = (ux * dx + uy * dy) / (length * length)
+            elif abs(side_v) > reach and (side_u > 0.0) != (side_v > 0.0):
+                share = side_u / (side_u - side_v)
+                px, py = ux + share * (vx - ux), uy + share * (vy - uy)
+                contact = (px * dx + py * dy) / (length * length)
+            else:
+                continue
+            if start + SKIN / length < contact < end:
+                end = contact
         middle = 0.5 * (start + end)
-        low = az + dz * (start if dz > 0.0 else end)
-        if low < roof and inside(walls, ax + dx * middle, ay + dy * middle) == building:
+        roof = _over(walls, ax + dx * middle, ay + dy * middle)[1]
+        if az + dz * start < roof - SKIN:
             return True
         start = end
     return False
@@ -162,42 +169,40 @@ def _enters(
 def _crosses(
     walls: Walls, ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> bool:
-    """Does the segment from a up to b (az <= bz, not vertical) pass through a wall?
+    """Whether the segment from a up to b (az <= bz, not vertical) passes through a wall.
 
     Walks the grid cells under the part of the segment that is inside the city's rectangle and below
     the tallest roof, from the low end, where a building in the way is most likely.
     """
-    dx, dy, dz = bx - ax, by - ay, bz - az
-    first, last = 0.0, 1.0
-    if az + dz > walls.tallest:
-        last = (walls.tallest - az) / dz
-    if dx != 0.0:
-        t0, t1 = -ax / dx, (walls.width - ax) / dx
-        first, last = max(first, min(t0, t1)), min(last, max(t0, t1))
-    elif ax < 0.0 or ax > walls.width:
-        return False
-    if dy != 0.0:
-        t0, t1 = -ay / dy, (walls.height - ay) / dy
-        first, last = max(first, min(t0, t1)), min(last, max(t0, t1))
-    elif ay < 0.0 or ay > walls.height:
-        return False
-    if first > last:
-        return False
-
     pieces, cells = walls.pieces, walls.cells
     cell, nx, ny = walls.cell, walls.nx, walls.ny
+    dx, dy, dz = bx - ax, by - ay, bz - az
+    per_dx = 1.0 / dx if dx != 0.0 else math.inf
+    per_dy = 1.0 / dy if dy != 0.0 else math.inf
+    first, last = 0.0, 1.0
+    if bz > walls.tallest:
+        last = (walls.tallest - az) / dz
+    if min(ax, bx) < 0.0 or max(ax, bx) > walls.width:
+        t0, t1 = -ax * per_dx, (walls.width - ax) * per_dx
+        first, last = max(first, min(t0, t1)), min(last, max(t0, t1))
+    if min(ay, by) < 0.0 or max(ay, by) > walls.height:
+        t0, t1 = -ay * per_dy, (walls.height - ay) * per_dy
+        first, last = max(first, min(t0, t1)), min(last, max(t0, t1))
+
     i = min(max(int((ax + dx * first) / cell), 0), nx - 1)
     j = min(max(int((ay + dy * first) / cell), 0), ny - 1)
-    step_i, step_j = 1 if dx > 0.0 else -1, 1 if dy > 0.0 else -1
-    next_i = ((i + (dx > 0.0)) * cell - ax) / dx if dx != 0.0 else math.inf
-    next_j = ((j + (dy > 0.0)) * cell - ay) / dy if dy != 0.0 else math.inf
-    stride_i = cell / abs(dx) if dx != 0.0 else math.inf
-    stride_j = cell / abs(dy) if dy != 0.0 else math.inf
+    # Per direction: cells left until the grid ends, the parameter of the next line, and of a cell.
+    left_i = nx - i if dx > 0.0 else i + 1
+    left_j = ny - j if dy > 0.0 else j + 1
+    next_i = ((i + (dx > 0.0)) * cell - ax) * per_dx if dx != 0.0 else math.inf
+    next_j = ((j + (dy > 0.0)) * cell - ay) * per_dy if dy != 0.0 else math.inf
+    stride_i, stride_j = cell * abs(per_dx), cell * abs(per_dy)
+    step_i, step_j = 1 if dx > 0.0 else -1, nx if dy > 0.0 else -nx
     reach = SKIN * math.sqrt(dx * dx + dy * dy)
+    c = j * nx + i
     t = first
-    while t <= last and 0 <= i < nx and 0 <= j < ny:
+    while t <= last:
         low = az + dz * t
-        c = j * nx + i
         if low < cells[c, 1]:
             for k in range(int(cells[c, 0]), int(cells[c + 1, 0])):
                 ux, uy = pieces[k, 0] - ax, pieces[k, 1] - ay
@@ -219,49 +224,50 @@ def _crosses(
                     min(abs(side_u), abs(side_v)) <= reach
                     or min(abs(side_a), abs(side_b)) <= wall_reach
                 ):
-                    if _enters(walls, int(pieces[k, 6]), ax, ay, az, bx, by, bz):
+                    leave = min(next_i, next_j, last)
+                    if _enters(walls, c, t, leave, ax, ay, az, dx, dy, dz):
                         return True
+                    break  # every wall of the cell has been looked at
                 elif az + dz * (side_a / (side_a - side_b)) < pieces[k, 4] - SKIN:
                     return True
         if next_i < next_j:
             t = next_i
-            i += step_i
+            c += step_i
             next_i += stride_i
+            left_i -= 1
         else:
             t = next_j
-            j += step_j
+            c += step_j
             next_j += stride_j
+            left_j -= 1
+        if left_i == 0 or left_j == 0:
+            break
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _under_roof(walls: Walls, x: float, y: float, z: float) -> bool:
-    """Is the point inside a building?"""
-    if z >= walls.tallest:
-        return False
-    building = inside(walls, x, y)
-    return building >= 0 and z < walls.buildings[building, 1] - SKIN
+    """Whether the point is inside a building."""
+    return z < walls.tallest and z < _over(walls, x, y)[1] - SKIN
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _unhidden(
     walls: Walls, ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> bool:
-    """Line of sight between two points of which neither is inside a building."""
-    if az >= walls.tallest and bz >= walls.tallest:
-        return True
-    if abs(bx - ax) <= SKIN and abs(by - ay) <= SKIN:
-        return True
-    if az <= bz:
-        return not _crosses(walls, ax, ay, az, bx, by, bz)
-    return not _crosses(walls, bx, by, bz, ax, ay, az)
+    """Line of sight from a up to b (az <= bz); a is not inside a building."""
+    return (
+        az >= walls.tallest
+        or (abs(bx - ax) <= SKIN and abs(by - ay) <= SKIN)
+        or not _crosses(walls, ax, ay, az, bx, by, bz)
+    )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def line_of_sight(
     walls: Walls, ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> bool:
-    """Is b visible from a? Blocked where the open segment meets the inside of a building.
+    """Whether b is visible from a: the open segment does not meet the inside of a building.
 
     Parameters
     ----------
@@ -273,10 +279,15 @@ def line_of_sight(
     -------
     bool
         Symmetric in a and b. False when an end is inside a building.
+
+    Notes
+    -----
+    Only the lower end is looked up. Where the upper end is inside a building, so is the lower one,
+    or the segment comes in through a wall below the roof.
     """
-    if _under_roof(walls, ax, ay, az) or _under_roof(walls, bx, by, bz):
-        return False
-    return _unhidden(walls, ax, ay, az, bx, by, bz)
+    if az > bz:
+        ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
+    return not _under_roof(walls, ax, ay, az) and _unhidden(walls, ax, ay, az, bx, by, bz)
 
 
 @njit(cache=True, error_model="numpy")
@@ -292,9 +303,13 @@ def visible_matrix(walls: Walls, observers: Floats, points: Floats) -> Bools:
         if _under_roof(walls, ax, ay, az):
             continue
         for k in range(m):
-            visible[o, k] = not buried[k] and _unhidden(
-                walls, ax, ay, az, points[k, 0], points[k, 1], points[k, 2]
-            )
+            bx, by, bz = points[k, 0], points[k, 1], points[k, 2]
+            if buried[k]:
+                continue
+            if az <= bz:
+                visible[o, k] = _unhidden(walls, ax, ay, az, bx, by, bz)
+            else:
+                visible[o, k] = _unhidden(walls, bx, by, bz, ax, ay, az)
     return visible
 
 
@@ -310,7 +325,7 @@ def visible_pairs(walls: Walls, a: Floats, b: Floats) -> Bools:
 
 @njit(cache=True, error_model="numpy")
 def inside_points(walls: Walls, points: Floats) -> Bools:
-    """(n,) is each ground point (n, 2) [m] inside a building?"""
+    """(n,) whether each ground point (n, 2) [m] is inside a building."""
     n = points.shape[0]
     covered = np.zeros(n, dtype=np.bool_)
     for k in range(n):
@@ -320,7 +335,7 @@ def inside_points(walls: Walls, points: Floats) -> Bools:
 
 @njit(cache=True, error_model="numpy")
 def path_clear(walls: Walls, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Does the ground segment stay inside the city's rectangle and out of every building?"""
+    """Whether the ground segment stays inside the city's rectangle and out of every building."""
     if not (0.0 <= ax <= walls.width and 0.0 <= ay <= walls.height):
         return False
     if not (0.0 <= bx <= walls.width and 0.0 <= by <= walls.height):
@@ -330,7 +345,7 @@ def path_clear(walls: Walls, ax: float, ay: float, bx: float, by: float) -> bool
 
 @njit(cache=True, error_model="numpy")
 def disc_clear(walls: Walls, x: float, y: float, radius: float) -> bool:
-    """Does a disc on the ground fit: in the city's rectangle, and no wall nearer than its radius?"""
+    """Whether a disc on the ground fits: in the rectangle, no wall nearer than its radius."""
     if not (radius <= x <= walls.width - radius and radius <= y <= walls.height - radius):
         return False
     pieces, cells, cell = walls.pieces, walls.cells, walls.cell
@@ -349,10 +364,9 @@ def disc_clear(walls: Walls, x: float, y: float, radius: float) -> bool:
 
 def warm_walls() -> Walls:
     """The smallest city with a wall, for a first call of any kernel that takes one."""
-    edges = np.array([[1.0, 1.0, 2.0, 1.0, 1.0, SKIN, 0.0]])
-    cells = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-    buildings = np.array([[0.0, 1.0], [1.0, 0.0]])
-    return Walls(3.0, 3.0, 1.0, 3.0, 1, 1, edges, cells, edges, buildings)
+    pieces = np.array([[1.0, 1.0, 2.0, 1.0, 1.0, SKIN, 0.0]])
+    cells = np.array([[0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
+    return Walls(3.0, 3.0, 1.0, 3.0, 1, 1, pieces, cells)
 
 
 def warm() -> None:

@@ -99,7 +99,7 @@ def _legend_rows(n_aircraft: int, width: int) -> list[list[tuple[str, Symbol]]]:
     if n_aircraft > shown:
         entries.append((f"and {n_aircraft - shown} more", lambda draw, place: None))
     entries += [
-        ("seen by its camera", _footprint_symbol),
+        ("camera footprint", _footprint_symbol),
         ("vehicle", _vehicle_symbol),
         ("estimate, 2 sigma", _track_symbol),
         ("detection", _detection_symbol),
