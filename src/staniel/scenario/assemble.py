@@ -47,13 +47,15 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         cooperation=scenario.cooperation,
         guidance=scenario.guidance,
     )
+    world = World(city, team, team.count, scenario.vehicles, clock, world_seed)
     return Mission(
-        world=World(city, team, team.count, scenario.vehicles, clock, world_seed),
+        world=world,
         cameras=Cameras(city, scenario.camera, team.altitude, camera_seed),
         radio=Radio(scenario.radio, radio_seed.generate_state(1, np.uint64)[0]),
         agents=[
             Agent(number, briefing, np.random.default_rng(seed))
             for number, seed in enumerate(agent_seed.spawn(team.count))
         ],
+        start=world.start(),
         ticks=round(scenario.minutes * 60.0 / clock.decision_step),
     )

@@ -1,0 +1,113 @@
+"""What a scenario holds: the rooms' own sections, composed into one frozen, checked whole."""
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+
+from staniel.cooperation.config import CooperationConfig
+from staniel.datatypes.clock import Clock
+from staniel.datatypes.config import Config
+from staniel.datatypes.equipment import Airframe, Camera, RadioSet
+from staniel.guidance.config import GuidanceConfig
+from staniel.tracking.config import TrackingConfig
+from staniel.world.config import Traffic
+
+__all__ = ["CITY_KEYS", "Aircraft", "CitySource", "Scenario"]
+
+Metres = Annotated[float, Field(gt=0.0, le=1e5)]
+
+
+def _low_first(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        raise ValueError("expected the lower bound first")
+    return pair
+
+
+Range = Annotated[tuple[Metres, Metres], AfterValidator(_low_first)]
+
+CITY_KEYS = {
+    "generate": ("size", "density", "block", "heights", "seed"),
+    "image": ("file", "cell", "heights", "seed"),
+    "grid": ("file", "cell", "heights", "seed"),
+}
+"""Which keys of the city belong to which source; every other one is refused there."""
+
+
+class CitySource(Config):
+    """Where the map comes from: generated, or read from an image or a Moving AI grid."""
+
+    source: Literal["generate", "image", "grid"] = Field("generate", description="kind of map")
+    size: tuple[Metres, Metres] = Field((600.0, 600.0), description="east, north [m]")
+    density: float = Field(0.42, gt=0.0, le=0.8, description="built share of the ground")
+    block: Range = Field((40.0, 60.0), description="shortest, longest side of a block [m]")
+    file: str | None = Field(None, min_length=1, description="image, or Moving AI .map")
+    cell: Metres | None = Field(None, description="metres per pixel or grid cell")
+    heights: Range = Field((10.0, 40.0), description="lowest and highest roof [m]")
+    seed: int | None = Field(None, ge=0, description="of the city; not set: the scenario's seed")
+
+    @model_validator(mode="after")
+    def _keys_of_this_source(self) -> Self:
+        own = CITY_KEYS[self.source]
+        for key in CitySource.model_fields:
+            strange = key != "source" and key not in own
+            if strange and key in self.model_fields_set and getattr(self, key) is not None:
+                raise ValueError(
+                    f"{key} does not belong to "
+                    f'source = "{self.source}": expected only {", ".join(own)}'
+                )
+        if self.source != "generate":
+            for key, meaning in (("file", "a file name"), ("cell", "metres per cell (--cell)")):
+                if getattr(self, key) is None:
+                    raise ValueError(f'{key} is missing: source = "{self.source}" needs {meaning}')
+        return self
+
+    @model_serializer(mode="wrap")
+    def _only_own_keys(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        own = ("source", *CITY_KEYS[self.source])
+        return {key: value for key, value in serialize(self).items() if key in own}
+
+
+class Aircraft(Airframe):
+    """The team: how many aircraft, all of one kind."""
+
+    count: int = Field(4, ge=1, le=500, description="aircraft in the team")
+
+
+class Scenario(Config):
+    """One mission, complete: with its seed it determines a run to the last bit."""
+
+    name: str = Field(
+        "mission",
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
+        max_length=64,
+        description="also names the run's folder",
+    )
+    description: str = Field("", max_length=2000, description="one sentence for lists")
+    seed: int = Field(0, ge=0, lt=2**63, description="of everything random in the run")
+    minutes: float = Field(10.0, gt=0.0, le=1440.0, description="mission time [min]")
+    chart: Literal["known", "blank"] = Field("known", description="do agents hold the city's map")
+
+    clock: Clock = Clock()
+    city: CitySource = CitySource()
+    vehicles: Traffic = Traffic()
+    aircraft: Aircraft = Aircraft()
+    camera: Camera = Camera()
+    radio: RadioSet = RadioSet()
+    tracking: TrackingConfig = TrackingConfig()
+    cooperation: CooperationConfig = CooperationConfig()
+    guidance: GuidanceConfig = GuidanceConfig()
+
+    @model_validator(mode="after")
+    def _at_least_one_decision(self) -> Self:
+        if self.minutes * 60.0 < self.clock.decision_step:
+            raise ValueError(
+                f"minutes = {self.minutes:g} is shorter than one "
+                f"clock.decision_step = {self.clock.decision_step:g} s"
+            )
+        return self

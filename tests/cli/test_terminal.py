@@ -1,0 +1,89 @@
+"""The bar is cheap, the text readable, the note on compiling comes only when it takes long."""
+
+import io
+import time
+
+import pytest
+from rich.console import Console
+
+from staniel import terminal
+from staniel.terminal import Reporter
+
+
+def reporter(*, tty: bool) -> tuple[Reporter, io.StringIO]:
+    stream = io.StringIO()
+    made = Reporter(console=Console(file=stream, force_terminal=tty, width=100))
+    return made, stream
+
+
+def tick(made: Reporter, seconds: float) -> None:
+    made.on_event("tick", time=seconds, duration=600.0, real_time_factor=300.0)
+
+
+def test_without_a_terminal_a_line_each_quarter(monkeypatch):
+    monkeypatch.setattr(terminal, "REFRESH", 0.0)
+    made, stream = reporter(tty=False)
+    with made:
+        for second in range(601):
+            tick(made, float(second))
+    lines = stream.getvalue().splitlines()
+    assert [line.split(" · ")[0] for line in lines] == [
+        f"flying: {t} of 10:00" for t in ("2:30", "5:00", "7:30", "10:00")
+    ]
+    assert "0:01 left · 300× real time" in lines[1]
+
+
+def test_on_a_terminal_a_bar_with_the_time_left(monkeypatch):
+    monkeypatch.setattr(terminal, "REFRESH", 0.0)
+    made, stream = reporter(tty=True)
+    with made:
+        tick(made, 300.0)
+    assert "5:00 of 10:00 · 0:01 left · 300× real time" in stream.getvalue()
+
+
+def test_the_last_tick_is_always_shown():
+    made, stream = reporter(tty=False)
+    with made:
+        for second in range(601):
+            tick(made, float(second))
+    assert "flying: 10:00 of 10:00 · 0:00 left" in stream.getvalue()
+
+
+@pytest.mark.parametrize("tty", [True, False])
+def test_what_is_written_is_named(tty):
+    made, stream = reporter(tty=tty)
+    with made:
+        made.on_event("rendering", what="overview.png")
+    assert "overview.png" in stream.getvalue()
+
+
+@pytest.mark.parametrize("tty", [True, False])
+def test_a_tick_costs_next_to_nothing(tty):
+    made, _ = reporter(tty=tty)
+    with made:
+        tick(made, 0.0)
+        best = min(_seconds_of_ticks(made) for _ in range(5))
+    assert best < 10e-6
+
+
+def _seconds_of_ticks(made: Reporter) -> float:
+    before = time.perf_counter()
+    for second in range(1000):
+        tick(made, float(second) * 0.1)
+    return (time.perf_counter() - before) / 1000
+
+
+@pytest.mark.parametrize(("delay", "noted"), [(0.2, True), (0.0, False)])
+def test_the_note_on_compiling_waits_for_a_reason(monkeypatch, delay, noted):
+    monkeypatch.setattr(terminal, "PATIENCE", 0.05)
+    made, stream = reporter(tty=False)
+    with made:
+        made.on_event("compiling", done=0, total=2)
+        time.sleep(delay)
+        made.on_event("compiling", done=2, total=2)
+    assert ("only the first time" in stream.getvalue()) == noted
+
+
+def test_times_of_day_and_unknown_times():
+    assert [terminal._clock(t) for t in (0.0, 59.6, 3601.0)] == ["0:00", "1:00", "60:01"]
+    assert terminal._clock(float("nan")) == "--:--"
