@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel._version import __version__
-from staniel.errors import OutputError
+from staniel.errors import OutputError, ScenarioError
 from staniel.kernels.warm import warm_all
 from staniel.metrics import compute_metrics
 from staniel.mission import Mission
@@ -106,7 +106,9 @@ def fly(
     """
     tell = on_event or _silent
     if seed is not None:
-        scenario = type(scenario).model_validate({**scenario.model_dump(), "seed": seed})
+        scenario = _reseeded(scenario, seed)
+    if out is not None:
+        check_folder(Path(out))  # A refusal should not have to wait for the kernels.
     city = build_city(scenario.city, scenario.seed)
     mission = assemble(scenario, city)
     warm_all(lambda done, total: tell("compiling", done=done, total=total))
@@ -121,7 +123,7 @@ def fly(
     ) as recorder:
         complete, factor = _fly_and_record(mission, recorder, scenario, tell)
         recorder.finish(complete)
-    metrics = _finish(folder, factor, movie, tell)
+    metrics = _render(read_record(folder / RECORD), folder, factor, movie, tell)
     return Run(folder, metrics, interrupted=not complete)
 
 
@@ -203,14 +205,18 @@ def _fly_and_record(
             flown = frame.truth.time
             factor = flown / (time.perf_counter() - started)
             tell("tick", time=flown, duration=duration, real_time_factor=factor)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as stop:
+        if isinstance(stop, SystemError) and not isinstance(stop.__cause__, KeyboardInterrupt):
+            raise  # A Ctrl-C while a kernel is being called arrives wrapped in a SystemError.
         tell("stopped", reason=f"stopped by hand after {flown:.0f} s of {duration:.0f} s")
         return False, factor
     return True, factor
 
 
-def _finish(folder: Path, factor: float, movie: bool, tell: Listener) -> dict[str, Any]:
-    return _render(read_record(folder / RECORD), folder, factor, movie, tell)
+def _reseeded(scenario: Scenario, seed: int) -> Scenario:
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**63:
+        raise ScenarioError(f"seed = {seed!r}: expected a whole number from 0 to 2^63 - 1")
+    return scenario.model_copy(update={"seed": seed})
 
 
 def _render(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from staniel.agent import Agent
 from staniel.datatypes.command import Command
 from staniel.datatypes.message import Message
+from staniel.datatypes.truth import Truth
 from staniel.record import Frame
 from staniel.world import Cameras, Radio, World
 
@@ -30,6 +31,8 @@ class Mission:
         What each hears of the others.
     agents : list of Agent
         One mind an aircraft, in the order of the aircraft.
+    start : Truth
+        Where everything stands before anything moved.
     ticks : int
         Decision steps until the end.
     """
@@ -38,11 +41,12 @@ class Mission:
     cameras: Cameras
     radio: Radio
     agents: list[Agent]
+    start: Truth
     ticks: int
 
     def frames(self) -> Iterator[Frame]:
         """Fly the mission, a frame a tick; the first is the start itself, before anything moved."""
-        truth = self.world.start()
+        truth = self.start
         commands: list[Command] = []
         outboxes: list[list[Message]] = [[] for _ in self.agents]
         for tick in range(self.ticks + 1):

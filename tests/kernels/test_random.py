@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
+
 from staniel.kernels.random import bits, fold, normals, uniform
 
 KEY = np.uint64(0x5EED)

@@ -39,8 +39,8 @@ class Pursuit:
     waypoint : (2,) float array [m]
         The track's prediction `GuidanceConfig.prediction_steps` decision steps ahead (thesis 5.5).
     cloud : callable
-        ``particles, weights = cloud()``: the belief about the target, (n, 4) float array of x, y [m],
-        vx, vy [m/s] and (n,) float array of weights that sum to 1. Made when it is asked for.
+        ``particles, weights = cloud()``: the belief about the target, (n, 4) float array of x, y
+        [m], vx, vy [m/s] and (n,) float array of weights that sum to 1. Made when asked for.
     airframe, camera : Airframe, Camera
     chart : City
         The map that the agent holds.

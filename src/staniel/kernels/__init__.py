@@ -1,0 +1,1 @@
+"""Hot paths: `@njit` functions of arrays, and nothing of ours above them."""

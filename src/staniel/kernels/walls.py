@@ -228,7 +228,7 @@ def _crosses(
                     if _enters(walls, c, t, leave, ax, ay, az, dx, dy, dz):
                         return True
                     break  # every wall of the cell has been looked at
-                elif az + dz * (side_a / (side_a - side_b)) < pieces[k, 4] - SKIN:
+                if az + dz * (side_a / (side_a - side_b)) < pieces[k, 4] - SKIN:
                     return True
         if next_i < next_j:
             t = next_i

@@ -61,7 +61,7 @@ class World:
             raise ScenarioError(f"aircraft count = {aircraft_count}: expected at least 1")
         if airframe.altitude <= city.tallest:
             raise ScenarioError(
-                f"airframe altitude = {airframe.altitude:g} m: expected above the tallest roof "
+                f"aircraft.altitude = {airframe.altitude:g} m: expected above the tallest roof "
                 f"({city.tallest:g} m), since aircraft do not avoid buildings"
             )
         self._city = city
