@@ -73,9 +73,9 @@ class Holding:
 
 @dataclass(frozen=True, slots=True)
 class _Lease:
-    """Somebody else's holding, as of the message said at `said`."""
+    """What another agent holds, as of the message said at `said`."""
 
-    holder: int
+    target: TrackId
     cost: float
     said: float
 
@@ -108,7 +108,7 @@ class Allocation:
         self.holding: Holding | None = None
         self.renames: list[tuple[TrackId, TrackId]] = []
         self._agent, self._config, self._radius, self._step = agent, config, turn_radius, step
-        self._leases: dict[TrackId, _Lease] = {}
+        self._leases: dict[int, _Lease] = {}
         self._auctions: dict[TrackId, _Auction] = {}
         self._paused: dict[TrackId, float] = {}
         self._said_cost = math.inf
@@ -207,19 +207,19 @@ class Allocation:
             case Revoke():
                 self._hear_revoke(message)
             case Release(target=target, sender=sender):
-                lease = self._leases.get(target)
-                if lease is not None and lease.holder == sender:
-                    del self._leases[target]
+                lease = self._leases.get(sender)
+                if lease is not None and lease.target == target:
+                    del self._leases[sender]
 
     def _hear_heartbeat(self, message: Heartbeat) -> None:
         target, sender, position = message.target, message.sender, message.target_position
-        # Who says nothing of an award after it was made did not hear it; who holds another, let go.
-        for held, lease in list(self._leases.items()):
-            if lease.holder == sender and held != target and message.time > lease.said:
-                del self._leases[held]
         if target is None or position is None:
+            lease = self._leases.get(sender)
+            # Who says nothing of an award after it was made did not hear it.
+            if lease is not None and message.time > lease.said:
+                del self._leases[sender]
             return
-        self._leases[target] = _Lease(sender, message.cost, message.time)
+        self._leases[sender] = _Lease(target, message.cost, message.time)
         self._auctions.pop(target, None)
         own = self._own_name(target, position)
         if self.holding is not None and self.holding.id in (target, own):
@@ -267,7 +267,7 @@ class Allocation:
         target = message.target
         self._auctions.pop(target, None)
         if message.winner != self._agent:
-            self._leases[target] = _Lease(message.winner, message.cost, message.time)
+            self._leases[message.winner] = _Lease(target, message.cost, message.time)
         elif self.holding is None:
             self._rename(self._own_name(target, message.position), target)
             self.holding = Holding(target, message.position, self._time)
@@ -277,7 +277,7 @@ class Allocation:
     def _hear_revoke(self, message: Revoke) -> None:
         if message.auctioneer == self._agent:
             self._auctions.pop(message.target, None)
-            self._leases[message.held_as] = _Lease(message.sender, message.cost, message.time)
+            self._leases[message.sender] = _Lease(message.held_as, message.cost, message.time)
             self._rename(message.target, message.held_as)
 
     # -- own auctions ----------------------------------------------------------------------------
@@ -287,8 +287,9 @@ class Allocation:
         return self._config.bid_wait * self._step
 
     def _open_auctions(self) -> None:
+        leases = {lease.target: lease for lease in self._leases.values()}
         for task in list(self._tasks.values()):
-            target, lease = task.id, self._leases.get(task.id)
+            target, lease = task.id, leases.get(task.id)
             if (
                 not task.seen
                 or target in self._auctions
@@ -328,9 +329,8 @@ class Allocation:
             self._say(Award, target=target, position=task.position, winner=winner, cost=cost)
             if winner == self._agent:
                 self.holding = Holding(target, task.position, self._time)
-                self._leases.pop(target, None)
             else:
-                self._leases[target] = _Lease(winner, cost, self._time)
+                self._leases[winner] = _Lease(target, cost, self._time)
 
     # -- small things ----------------------------------------------------------------------------
 
