@@ -20,7 +20,7 @@ from staniel.metrics import compute_metrics
 from staniel.mission import Mission
 from staniel.record import Record
 from staniel.recording import Recorder, read_record, tracks_table, truth_table
-from staniel.scenario import Scenario, build_city, dump_scenario
+from staniel.scenario import Scenario, build_city, dump_scenario, load_scenario
 from staniel.scenario.assemble import assemble
 
 __all__ = ["Run", "fly", "replay"]
@@ -70,7 +70,7 @@ class Run:
 
 
 def fly(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     seed: int | None = None,
     out: str | Path | None = None,
     *,
@@ -81,8 +81,8 @@ def fly(
 
     Parameters
     ----------
-    scenario : Scenario
-        From `staniel.load_scenario`.
+    scenario : Scenario, str or path
+        From `staniel.load_scenario`, or what it takes: a packaged name or a TOML file.
     seed : int, optional
         Of everything random; the scenario's own when not given.
     out : path, optional
@@ -105,6 +105,8 @@ def fly(
         The folder is not empty or not writable, or the disk is full. What was recorded is kept.
     """
     tell = on_event or _silent
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
     if seed is not None:
         scenario = _reseeded(scenario, seed)
     if out is not None:
