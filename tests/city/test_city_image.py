@@ -170,7 +170,8 @@ def test_bad_pictures_are_refused_with_the_file_and_the_reason(tmp_path):
         "cut.png": (whole.read_bytes()[:2000], "expected a picture that can be read"),
         "cut_header.png": (whole.read_bytes()[:20], "expected a picture that can be read"),
         "large.png": (png_header_only(4001, 4000), "at most 16000000 pixels, got 4001 x 4000"),
-        "bomb.png": (png_header_only(60_000, 60_000), "expected a picture"),
+        "huge.png": (png_header_only(20_000, 20_000), "at most 16000000 pixels, got many more"),
+        "bomb.png": (png_header_only(60_000, 60_000), "at most 16000000 pixels, got many more"),
         "wide.png": (png_header_only(12_000, 12_000), "at most 16000000 pixels, got 12000 x 12000"),
     }
     for name, (content, reason) in cases.items():

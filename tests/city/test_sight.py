@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from staniel.city import City
 from staniel.kernels import walls as sight
+from staniel.kernels.pieces import BEGIN, BUILT, LANES
 
 SIZE = 24
 
@@ -110,6 +111,63 @@ def test_unit_houses_agree_with_exact_fractions(data):
     pairs = data.draw(st.lists(st.tuples(node, node), min_size=10, max_size=10))
     got = city.visible_pairs([p for p, _ in pairs], [q for _, q in pairs])
     assert got.tolist() == [exactly_visible(city, p, q) for p, q in pairs]
+
+
+@pytest.mark.parametrize("miss", [1e-1, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
+def test_rays_that_nearly_touch_are_decided_exactly(miss):
+    """Kilometres from the origin, past corners, over roofs and onto walls by less and less."""
+    rng = np.random.default_rng(7)
+    house = shapely.Polygon([(5001.25, 4003.5), (5020.5, 4008.25), (5015.75, 4027), (4997, 4020)])
+    city = City.from_outlines([house], [16.0], (6000.0, 6000.0))
+    corners = np.array(house.exterior.coords)[:4]
+    a, b = [], []
+    for corner in corners:
+        for _ in range(12):
+            aim = np.array([*(corner + rng.uniform(-1, 1, 2) * miss), 16.0 + rng.normal() * miss])
+            way = rng.normal(size=3) * (1.0, 1.0, 0.2)
+            far = 10.0 ** rng.uniform(0.5, 2.3, 2)
+            a.append(aim + far[0] * way)
+            b.append(aim if rng.random() < 0.3 else aim - far[1] * way)
+    got = city.visible_pairs(a, b)
+    assert got.tolist() == [exactly_visible(city, p, q) for p, q in zip(a, b, strict=True)]
+    assert 0.1 < got.mean() < 0.95
+
+
+def test_many_walls_in_one_cell_and_ends_far_away():
+    """More walls than a block holds, some shorter than a decimetre; sight over any distance."""
+    turns = np.arange(300) * np.pi / 150.0
+    tower = shapely.Polygon(50.0 + 4.0 * np.column_stack([np.cos(turns), np.sin(turns)]))
+    court = shapely.box(20, 20, 32, 32) - shapely.box(24, 24, 28, 28)
+    city = City.from_outlines([tower, court], [30.0, 12.0], (100.0, 80.0))
+    rng = np.random.default_rng(3)
+    a = rng.uniform((-20, -20, 0), (120, 100, 60), (400, 3))
+    b = rng.uniform((0, 0, 0), (100, 80, 20), (400, 3))
+    assert city.visible_pairs(a, b).tolist() == [
+        shapely_visible(city, p, q) for p, q in zip(a, b, strict=True)
+    ]
+    for far in (1e3, 1e4, 1e6, 1e8, 1e12):
+        ends = [[-far, 50.0, 5.0], [far, 50.0, 5.0], [-far, 75.0, 5.0], [26.0, 26.0, far]]
+        assert city.visible(ends, [[70.0, 50.0, 5.0]])[:2, 0].tolist() == [False, True]
+        assert city.visible_pairs(ends[2:], [[far, 75.0, 5.0], [26.0, 26.0, 1.0]]).all()
+
+
+def test_every_wall_is_in_a_block_of_each_cell_it_touches():
+    city = City.generate(size=(300.0, 260.0), seed=1)
+    walls = city.walls
+    held = []
+    for c in range(walls.nx * walls.ny):
+        begin, end = walls.blocks[c, BEGIN:BUILT].astype(int)
+        corner = np.array([c % walls.nx, c // walls.nx]) * walls.cell
+        for row in (c, *range(begin, end)):
+            x, y, ex, ey, roof = walls.blocks[row, : 5 * LANES].reshape(5, LANES)
+            start = np.column_stack([x, y]) + corner
+            ends = np.column_stack([start, start + np.column_stack([ex, ey]), roof])
+            held += [[c, *e] for e in ends if e[4] > 0.0]
+    first = walls.cells[:, 0].astype(int)
+    cell = np.repeat(np.arange(walls.nx * walls.ny), np.diff(first))
+    expected = np.column_stack([cell, walls.pieces[:, :5]])
+    assert len(held) == len(expected)
+    assert np.allclose(held, expected, rtol=1e-6, atol=1e-4)
 
 
 def shapely_visible(city, a, b):

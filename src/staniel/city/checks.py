@@ -149,4 +149,16 @@ def _corners(ring: shapely.LinearRing) -> Floats:
     chord = after - before
     arm = points - before
     off = np.abs(chord[:, 0] * arm[:, 1] - chord[:, 1] * arm[:, 0])
-    return points[off > _STRAIGHT * np.hypot(chord[:, 0], chord[:, 1])]
+    turns = off > _STRAIGHT * np.hypot(chord[:, 0], chord[:, 1])
+    corners = points[turns]
+    if turns.all() or (len(corners) >= 3 and _near(points[~turns], corners)):
+        return corners
+    # Two corners within rounding of each other hide each other: drop one after another.
+    kept = shapely.get_coordinates(ring.simplify(_STRAIGHT, preserve_topology=False))[:-1]
+    return kept if len(kept) >= 3 else points
+
+
+def _near(points: Floats, corners: Floats) -> bool:
+    """Whether points that were dropped lie on the ring that is left."""
+    far = shapely.distance(shapely.points(points), shapely.LinearRing(corners))
+    return bool((far <= 4.0 * _STRAIGHT).all())

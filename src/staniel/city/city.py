@@ -1,9 +1,9 @@
 """The city: a rectangle of ground with extruded buildings on it."""
 
-import json
 import math
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import Any
 
@@ -12,11 +12,15 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from staniel.city.checks import check_heights, check_outlines, check_size, straightened
+from staniel.city.features import Origin
 from staniel.city.generate import generate_outlines
+from staniel.city.geojson import NO_REPAIRS, CityWarning, Repairs, read_buildings
 from staniel.city.grid import grid_outlines
 from staniel.city.image import image_outlines
 from staniel.city.index import build_walls
-from staniel.errors import CityError
+from staniel.city.plain import dict_parts, parts_dict, write_geojson
+from staniel.city.roads import RoadNetwork
+from staniel.city.statistics import CityStatistics, city_statistics
 from staniel.kernels import walls as sight
 from staniel.kernels.walls import Walls
 
@@ -30,8 +34,9 @@ Bools = NDArray[np.bool_]
 class City:
     """A rectangle of flat ground with buildings, frozen and indexed for sight.
 
-    Made by `generate`, `from_image`, `from_grid`, `from_outlines`, `from_dict` or `open`, which
-    check what they are given. East-north metres from the south-west corner; the ground is at 0.
+    Made by `generate`, `from_image`, `from_grid`, `from_geojson`, `from_outlines`, `from_dict` or
+    `open`, which check what they are given. East-north metres from the south-west corner; the
+    ground is at 0.
 
     Attributes
     ----------
@@ -44,6 +49,12 @@ class City:
         Roof heights.
     walls : Walls
         The index that kernels walk.
+    origin : Origin, optional
+        Where the south-west corner lies on Earth, or in the plane of the file it came from.
+    repairs : Repairs
+        What was mended in that file, counted.
+    roads : RoadNetwork, optional
+        All that were read, also those that cross buildings or leave the rectangle.
 
     Examples
     --------
@@ -59,6 +70,9 @@ class City:
     outlines: tuple[shapely.Polygon, ...]
     heights: Floats
     walls: Walls = field(init=False, repr=False)
+    origin: Origin | None = None
+    repairs: Repairs = NO_REPAIRS
+    roads: RoadNetwork | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "walls", build_walls(self.outlines, self.heights, self.size))
@@ -229,6 +243,66 @@ class City:
         return cls(extent, outlines, roofs)
 
     @classmethod
+    def from_geojson(
+        cls,
+        path: str | PathLike[str],
+        *,
+        heights: tuple[float, float],
+        seed: int = 0,
+        frame: str = "auto",
+        origin: tuple[float, float] | None = None,
+        size: tuple[float, float] | None = None,
+        roads: str | PathLike[str] | None = None,
+    ) -> "City":
+        """A city from the building footprints of a GeoJSON file.
+
+        Polygons and MultiPolygons with courtyards, also in collections. What is wrong is mended
+        and counted in `repairs`: rings that cross themselves, are not closed, have no area or
+        coordinates that are not finite; outlines under 1 m²; outlines that overlap, of which the
+        taller building keeps the ground.
+
+        Parameters
+        ----------
+        path : path
+            At most 256 MB, 500 000 features and 20 million positions.
+        heights : (float, float) [m]
+            A roof is at the feature's `height` (a number, or a text such as "12 m"), else at 3 m
+            for each of its `levels`, `building:levels` or `Floor`, else drawn uniformly between
+            these.
+        seed : int
+            Of the heights that are drawn.
+        frame : {"auto", "wgs84", "metres"}
+            Of the coordinates: longitude and latitude, or a plane. "auto" decides by their range;
+            the city's `origin` says which it was.
+        origin : (float, float), optional
+            Place of the south-west corner in that frame. Not given: 10 m south and west of all.
+        size : (float, float), optional [m]
+            Not given: up to 10 m north and east of all. With either, what is outside is cut off.
+        roads : path, optional
+            Another file, with roads in the same frame: see `RoadNetwork.from_geojson`.
+
+        Raises
+        ------
+        CityError
+            A file that is missing, too large or malformed (with the feature's number); no building
+            in it, or a city larger than 100 km; a value out of its range.
+
+        Warns
+        -----
+        CityWarning
+            What was mended, counted.
+        """
+        found = read_buildings(path, heights, seed, frame, origin, size)
+        if found.repairs.mended:
+            warnings.warn(f"{path}: mended {found.repairs}", CityWarning, stacklevel=2)
+        city = cls(
+            found.size, found.outlines, found.roofs, origin=found.origin, repairs=found.repairs
+        )
+        if roads is not None:
+            object.__setattr__(city, "roads", RoadNetwork.from_geojson(roads, city=city))
+        return city
+
+    @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "City":
         """The city that `to_dict` wrote.
 
@@ -237,17 +311,9 @@ class City:
         CityError
             Keys or values that `to_dict` does not write.
         """
-        try:
-            buildings = list(data["buildings"])
-            outlines = [shapely.Polygon(b["outline"], b.get("holes", [])) for b in buildings]
-            heights = [float(b["height"]) for b in buildings]
-            size = (float(data["size"][0]), float(data["size"][1]))
-        except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-            raise CityError(
-                "city: expected a mapping with 'size' [east, north] and 'buildings', each with "
-                f"'height', 'outline' and optional 'holes', got {_shortened(data)} ({error})"
-            ) from error
-        return cls.from_outlines(outlines, heights, size)
+        outlines, heights, size, origin = dict_parts(data)
+        city = cls.from_outlines(outlines, heights, size)
+        return city if origin is None else replace(city, origin=origin)
 
     def to_dict(self) -> dict[str, Any]:
         """A JSON-able copy, exact to the last bit; whole numbers are written as integers.
@@ -258,16 +324,48 @@ class City:
         {'size': [9, 5],
          'buildings': [{'height': 4.5, 'outline': [[3, 1], [3, 2], [1, 2], [1, 1]]}]}
         """
-        buildings: list[dict[str, Any]] = []
-        for outline, height in zip(self.outlines, self.heights.tolist(), strict=True):
-            building: dict[str, Any] = {
-                "height": _short(height),
-                "outline": _ring(outline.exterior),
-            }
-            if outline.interiors:
-                building["holes"] = [_ring(hole) for hole in outline.interiors]
-            buildings.append(building)
-        return {"size": [_short(self.size[0]), _short(self.size[1])], "buildings": buildings}
+        return parts_dict(self.outlines, self.heights, self.size, self.origin)
+
+    def to_geojson(self, path: str | PathLike[str]) -> None:
+        """Write the buildings as GeoJSON, each with its `height`.
+
+        Longitude and latitude where the city's origin is known in them, else metres. Read back
+        with `from_geojson(path, origin=(origin.x, origin.y), size=size)` it is the same city.
+
+        Parameters
+        ----------
+        path : path
+            Written over where it exists.
+
+        Raises
+        ------
+        OutputError
+            The file cannot be written.
+        """
+        write_geojson(path, self.outlines, self.heights, self.origin)
+
+    def statistics(self, altitude: float | None = None) -> CityStatistics:
+        """How dense and how tall the city is.
+
+        Parameters
+        ----------
+        altitude : float, optional [m]
+            Height of flight above the ground, greater than 0; given, its ratio to the mean roof is
+            told, which decides how much buildings hide.
+
+        Raises
+        ------
+        CityError
+            An altitude that is not greater than 0.
+
+        Examples
+        --------
+        >>> houses = [shapely.box(0, 0, 10, 10), shapely.box(20, 0, 30, 30)]
+        >>> figures = City.from_outlines(houses, [10.0, 20.0], (40.0, 40.0)).statistics(57.0)
+        >>> figures.density, figures.mean, figures.mean_roof, figures.height_ratio
+        (0.25, 15.0, 17.5, 3.257142857142857)
+        """
+        return city_statistics(self.outlines, self.heights, self.size, altitude)
 
     @property
     def density(self) -> float:
@@ -367,20 +465,3 @@ def _rows(name: str, values: ArrayLike, columns: int) -> Floats:
         bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
         raise ValueError(f"{name} must be finite, got {rows[bad].tolist()} in row {bad}")
     return rows
-
-
-def _short(value: float) -> float | int:
-    return int(value) if value.is_integer() else value
-
-
-def _ring(ring: shapely.LinearRing) -> list[list[float | int]]:
-    """Corners of a ring; the first is not repeated at the end."""
-    return [[_short(x), _short(y)] for x, y in shapely.get_coordinates(ring)[:-1].tolist()]
-
-
-def _shortened(data: object) -> str:
-    try:
-        text = json.dumps(data)
-    except (TypeError, ValueError):
-        text = repr(data)
-    return text if len(text) <= 60 else text[:57] + "..."

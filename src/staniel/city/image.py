@@ -56,6 +56,10 @@ def _grey_levels(path: Path) -> Floats | NDArray[np.uint8]:
             return _decoded(image)
     except CityError:
         raise
+    except Image.DecompressionBombError:  # Pillow's own bound, met before ours
+        raise CityError(
+            f"{path}: expected a picture of at most {MOST_CELLS} pixels, got many more"
+        ) from None
     except Exception as error:  # a damaged file can fail in any way inside a decoder
         raise CityError(f"{path}: expected a picture that can be read, got: {error}") from error
 

@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from staniel.kernels.walls import SKIN, Walls
+from staniel.kernels.pieces import BEGIN, BUILT, END, LANES, ROW, SKIN, Walls
 
 __all__ = ["build_walls"]
 
@@ -17,8 +17,9 @@ Ints = NDArray[np.int64]
 _MARGIN = (
     1e-6  # a wall this near to a cell is listed in it: above rounding, below anything real [m]
 )
-_WALLS_A_CELL = 0.4  # about as many cells as walls / this: measured best for sight
-_MOST_CELLS = 4_000_000
+_WALLS_A_CELL = 3.0  # about as many cells as walls / this: measured best for sight
+_FAR, _DEEP = 1e6, 1e30  # where the lanes are that hold no wall [m]
+_MOST_CELLS = 1_000_000
 
 
 def build_walls(
@@ -56,7 +57,9 @@ def build_walls(
     known = (over > 0) & (over <= len(heights))
     cells[:-1, 3][known] = heights[over[known] - 1]
     tallest = float(heights.max(initial=0.0))
-    return Walls(width, height, tallest, cell, nx, ny, np.ascontiguousarray(edges[wall]), cells)
+    pieces = np.ascontiguousarray(edges[wall])
+    blocks, span = _blocks(pieces, touched, cells, cell, nx)
+    return Walls(width, height, tallest, cell, nx, ny, span, pieces, cells, blocks)
 
 
 def _edges(outlines: Sequence[shapely.Polygon], heights: Floats) -> Floats:
@@ -70,6 +73,33 @@ def _edges(outlines: Sequence[shapely.Polygon], heights: Floats) -> Floats:
     edges[:, 6] = building[ring[same]]
     edges[:, 4] = heights[building[ring[same]]]
     return edges
+
+
+def _blocks(
+    pieces: Floats, touched: Ints, cells: Floats, cell: float, nx: int
+) -> tuple[NDArray[np.float32], float]:
+    """`Walls.blocks` and `Walls.span` of pieces sorted by the cell they are listed in."""
+    first = cells[:, 0].astype(np.int64)
+    counts = np.diff(first)
+    more = np.maximum(0, -(-counts // LANES) - 1)
+    ends = len(counts) + np.cumsum(more)
+    n_blocks = int(ends[-1])
+    # Beginning at a cache line.
+    store = np.zeros(n_blocks * ROW + 16, dtype=np.float32)
+    skip = (-store.ctypes.data // 4) % 16
+    blocks = store[skip : skip + n_blocks * ROW].reshape(n_blocks, ROW)
+    by_wall = blocks[:, : 5 * LANES].reshape(n_blocks, 5, LANES)
+    by_wall[:] = np.array([_FAR, _FAR, 1.0, 0.0, -_DEEP])[:, None]
+    blocks[: len(counts), BEGIN] = ends - more
+    blocks[: len(counts), END] = ends
+    blocks[: len(counts), BUILT] = cells[:-1, 2] > 0.0
+
+    corner = np.column_stack([touched % nx, touched // nx]) * cell
+    near = np.hstack([pieces[:, :2] - corner, pieces[:, 2:4] - pieces[:, :2], pieces[:, 4:5]])
+    rank = np.arange(len(touched)) - first[touched]
+    block = np.where(rank < LANES, touched, (ends - more)[touched] + rank // LANES - 1)
+    by_wall[block, :, rank % LANES] = near
+    return blocks, float(np.abs(near[:, :4]).max(initial=1.0))
 
 
 def _expand(first: Ints, last: Ints) -> tuple[Ints, Ints]:

@@ -3,6 +3,7 @@
 from os import PathLike
 from pathlib import Path
 
+from staniel.city.checks import check_cell
 from staniel.city.city import City
 from staniel.errors import CityError
 
@@ -12,20 +13,27 @@ _PICTURES = frozenset(
     {".png", ".jpg", ".jpeg", ".bmp", ".gif", ".tif", ".tiff", ".webp", ".pbm", ".pgm", ".ppm"}
 )
 
+_FOOTPRINTS = frozenset({".geojson", ".json"})
+
 
 def load_city(
-    path: str | PathLike[str], *, cell: float, heights: tuple[float, float], seed: int = 0
+    path: str | PathLike[str],
+    *,
+    cell: float | None = None,
+    heights: tuple[float, float],
+    seed: int = 0,
 ) -> City:
-    """Read a city from a picture or a Moving AI grid.
+    """Read a city from a picture, a Moving AI grid or building footprints.
 
     Parameters
     ----------
     path : path
-        A ``.map`` grid (see `City.from_grid`) or a picture (see `City.from_image`).
+        A ``.map`` grid (see `City.from_grid`), a ``.geojson`` or ``.json`` file (see
+        `City.from_geojson`) or a picture (see `City.from_image`).
     cell : float [m]
-        Side of a cell or pixel on the ground.
+        Side of a cell or pixel on the ground. GeoJSON has its own scale and takes none.
     heights : (float, float) [m]
-        Roof heights are drawn uniformly between these.
+        Roof heights are drawn uniformly between these, of GeoJSON those that the file lacks.
     seed : int
         Of the heights.
 
@@ -36,11 +44,15 @@ def load_city(
     """
     file = Path(path)
     suffix = file.suffix.lower()
-    if suffix == ".map":
-        return City.from_grid(file, cell=cell, heights=heights, seed=seed)
-    if suffix in _PICTURES:
-        return City.from_image(file, cell=cell, heights=heights, seed=seed)
+    if suffix in _FOOTPRINTS:
+        if cell is not None:
+            raise CityError(f"{file}: expected no cell, GeoJSON has its own scale, got {cell!r}")
+        return City.from_geojson(file, heights=heights, seed=seed)
+    if suffix == ".map" or suffix in _PICTURES:
+        read = City.from_grid if suffix == ".map" else City.from_image
+        return read(file, cell=check_cell(cell), heights=heights, seed=seed)
     raise CityError(
         f"{file}: expected a Moving AI .map grid or a picture ({', '.join(sorted(_PICTURES))}), "
+        f"or GeoJSON ({', '.join(sorted(_FOOTPRINTS))}), "
         f"got the suffix {suffix!r}"
     )

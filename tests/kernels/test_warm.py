@@ -1,0 +1,54 @@
+"""After `warm_all` nothing compiles in flight: no kernel meets a type that is new to it."""
+
+import importlib
+import pkgutil
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+import staniel.kernels
+from staniel.kernels.warm import warm_all
+from staniel.recording import Recorder
+from staniel.scenario import build_city, load_scenario
+from staniel.scenario.assemble import assemble, kernels_of
+
+EXTRAS = {
+    "plain": {},
+    "gusts": {"wind": {"gusts": True}},
+    "lidar": {"lidar": {"mount": "scanner"}},
+    "gimbal": {"camera": {"mount": "gimbal"}},
+}
+
+
+def compiled():
+    """Every kernel of the package and how many signatures it is compiled for."""
+    counts = {}
+    for module in pkgutil.iter_modules(staniel.kernels.__path__):
+        members = vars(importlib.import_module(f"staniel.kernels.{module.name}"))
+        for name, member in members.items():
+            if isinstance(member, Dispatcher):
+                counts[module.name, name] = len(member.signatures)
+    return counts
+
+
+@pytest.mark.parametrize("changes", EXTRAS.values(), ids=EXTRAS)
+def test_nothing_compiles_in_flight(changes, tmp_path):
+    scenario = load_scenario("downtown", minutes=2.0, **changes)
+    city = build_city(scenario.city, scenario.seed)
+    warm_all(lambda done, total: None, kernels_of(scenario))
+    before = compiled()
+    settings = scenario.model_dump(mode="json")
+    with Recorder(
+        tmp_path / "a.mcap", scenario=settings, version="0", city=city, clock=scenario.clock
+    ) as recorder:
+        for frame in assemble(scenario, city).frames():
+            recorder.write(frame)
+        recorder.finish(complete=True)
+    assert compiled() == before
+
+
+def test_progress_is_told_from_nothing_to_all():
+    told = []
+    warm_all(lambda done, total: told.append((done, total)), ["polygon"])
+    assert told[0][0] == 0
+    assert told[-1][0] == told[-1][1] == len(told) - 1
