@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -15,12 +16,14 @@ from staniel.kernels.flight import MAX_BANKS, fly
 from staniel.world.aircraft import encode, limits
 
 AIRFRAME = Airframe()
-LIMITS = limits(AIRFRAME)
+LIMITS = limits([AIRFRAME])[0]
 
 
-def flown(command, state, seconds, dt=0.1, airframe=AIRFRAME):
-    start = np.array([state], dtype=float)
-    return fly(start, encode([command]), limits(airframe), dt, round(seconds / dt))[:, 0]
+def flown(command, state, seconds, dt=0.1, airframe=AIRFRAME, wind=(0.0, 0.0)):
+    start, steps = np.array([state], dtype=float), round(seconds / dt)
+    air = np.empty((steps, 1, 2))
+    air[:] = wind
+    return fly(start, np.zeros(1), encode([command]), limits([airframe]), air, dt, steps)[0][:, 0]
 
 
 @pytest.mark.parametrize("bank_deg", [30.0, -20.0, 35.0])
@@ -43,7 +46,7 @@ def test_roll_speed_and_way_agree_with_an_ode_solver():
 
     def rates(_time, s):
         roll = np.clip(3.0 * (wanted - s[3]), -LIMITS[5], LIMITS[5])
-        push = 1.5 if s[4] < speed else 0.0
+        push = np.clip(speed - s[4], -1.5, 1.5)
         return [
             s[4] * math.cos(s[2]),
             s[4] * math.sin(s[2]),
@@ -159,10 +162,32 @@ def test_a_bank_sequence_is_flown_in_time_and_its_last_bank_is_held():
     assert path[-1, 4] == pytest.approx(0.0, abs=1e-3)
 
 
-def test_altitude_is_reached_at_the_climb_limit():
-    path = flown(FlyLine((0.0, 0.0), (1.0, 0.0), 15.0, 95.0), [0, 0, 80, 0, 0, 15], 6.0)
-    assert path[9, 2] == pytest.approx(83.0)
-    assert path[-1, 2] == 95.0
+def test_speed_follows_its_first_order_step_response():
+    airframe = Airframe(max_acceleration=50.0, speed_gain=0.7)
+    path = flown(FlyBanks((0.0,), 1.0, 18.0, 80.0), [0, 0, 80, 0, 0, 15], 6.0, airframe=airframe)
+    times = 0.1 * np.arange(61)
+    _, step = scipy.signal.step(([0.7], [1.0, 0.7]), T=times)
+    np.testing.assert_allclose(path[:, 5], 15.0 + 3.0 * step[1:], atol=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.4, 1.0, 2.0])
+def test_altitude_follows_its_second_order_step_response(damping):
+    """Thesis eq. 5.12 (corrected): h/h_c = (b' s + b)/(s² + b' s + b), but for h'_c = 0."""
+    b = 0.36
+    b1 = 2.0 * damping * math.sqrt(b)
+    airframe = Airframe(max_climb=1e3, altitude_gain=b, climb_gain=b1)
+    path = flown(FlyBanks((0.0,), 1.0, 15.0, 90.0), [0, 0, 80, 0, 0, 15], 20.0, airframe=airframe)
+    _, step = scipy.signal.step(([b], [1.0, b1, b]), T=0.1 * np.arange(201))
+    np.testing.assert_allclose(path[:, 2], 80.0 + 10.0 * step[1:], atol=1e-4)
+
+
+def test_altitude_is_reached_at_the_climb_limit_without_overshoot():
+    path = flown(FlyLine((0.0, 0.0), (1.0, 0.0), 15.0, 140.0), [0, 0, 80, 0, 0, 15], 60.0)
+    climb = np.diff(path[:, 2]) / 0.1
+    assert climb.max() == pytest.approx(3.0, abs=1e-3)
+    np.testing.assert_allclose(climb[80:120], 3.0, atol=1e-3)
+    assert path[:, 2].max() <= 140.0
+    assert path[-1, 2] == pytest.approx(140.0, abs=1e-3)
 
 
 def test_aircraft_do_not_depend_on_one_another():
@@ -170,8 +195,11 @@ def test_aircraft_do_not_depend_on_one_another():
     commands = encode(
         [FlyOrbit((9.0, 9.0), 45.0, 1, 15, 80), FlyLine((0.0, 0.0), (9.0, 9.0), 15, 80)]
     )
-    both = fly(states, commands, LIMITS, 0.1, 10)
-    alone = fly(states[:1].copy(), commands[:1].copy(), LIMITS, 0.1, 10)
+    air, rows = np.ones((10, 2, 2)), limits([AIRFRAME] * 2)
+    both, _ = fly(states, np.zeros(2), commands, rows, air, 0.1, 10)
+    alone, _ = fly(
+        states[:1].copy(), np.zeros(1), commands[:1].copy(), rows[:1], air[:, :1].copy(), 0.1, 10
+    )
     np.testing.assert_array_equal(both[:, :1], alone)
 
 

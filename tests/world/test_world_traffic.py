@@ -7,7 +7,9 @@ import shapely
 from staniel.angles import wrap_array
 from staniel.city import City
 from staniel.errors import CityError, ScenarioError, StanielError
-from staniel.kernels.traffic import _neighbours, drive, streets
+from staniel.kernels.neighbours import neighbours
+from staniel.kernels.streets import streets
+from staniel.kernels.traffic import drive
 from staniel.world.config import Traffic
 from staniel.world.traffic import begin, habits
 
@@ -16,10 +18,11 @@ KEYS = np.random.SeedSequence(7).generate_state(2, np.uint64)
 
 def driven(city, traffic, ticks, dt=0.1, substeps=10, keys=KEYS):
     vehicles, memory = begin(city, traffic, keys[0])
+    speeds = np.full(traffic.count, traffic.speed)
     path = [vehicles[None]]
     for tick in range(ticks):
         steps, memory = drive(
-            city.walls, vehicles, memory, habits(traffic), keys[1], tick, dt, substeps
+            city.walls, vehicles, memory, habits(traffic), speeds, keys[1], tick, dt, substeps
         )
         vehicles = steps[-1].copy()
         path.append(steps)
@@ -120,7 +123,7 @@ def test_neighbours_are_found_however_they_lie():
     rng = np.random.default_rng(0)
     for shape in ((300.0, 300.0), (900.0, 1e-9), (1e-9, 900.0), (5000.0, 5000.0)):
         vehicles = np.column_stack([rng.uniform(0, 1, (150, 2)) * shape, np.zeros((150, 2))])
-        first, near = _neighbours(vehicles, 20.0)
+        first, near = neighbours(vehicles, 20.0)
         apart = np.hypot(*(vehicles[:, None, :2] - vehicles[None, :, :2]).T).T
         for i in range(150):
             expected = set(np.flatnonzero(apart[i] < 20.0)) - {i}

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from staniel.datatypes.lidar import LidarScan
+
 __all__ = ["Belief", "Percept", "Pose", "Sighting", "TrackEstimate", "TrackId"]
 
 
@@ -151,11 +153,12 @@ class TrackEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """What one aircraft perceives in one tick: its own navigation and its own camera."""
+    """What one aircraft perceives in one tick: its own navigation, its camera and its lidar."""
 
     time: float
     pose: Pose
     sightings: tuple[Sighting, ...]
+    lidar: LidarScan | None = None
 
 
 @dataclass(frozen=True, slots=True)

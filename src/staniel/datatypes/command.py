@@ -1,8 +1,9 @@
 """What an agent asks of its autopilot: a path segment, or a timed sequence of banks."""
 
+import math
 from dataclasses import dataclass
 
-__all__ = ["Command", "FlyBanks", "FlyLine", "FlyOrbit"]
+__all__ = ["Command", "FlyBanks", "FlyLine", "FlyOrbit", "look_point"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,3 +41,18 @@ class FlyBanks:
 
 
 Command = FlyLine | FlyOrbit | FlyBanks
+
+
+def look_point(command: Command) -> tuple[float, float]:
+    """Ground point that a gimballed camera looks at while the command is flown [m].
+
+    The end of a line, the center of an orbit; NaN for banks, which leads it nowhere.
+
+    Examples
+    --------
+    >>> look_point(FlyLine((0.0, 0.0), (50.0, 20.0), 15.0, 80.0))
+    (50.0, 20.0)
+    """
+    if isinstance(command, FlyLine):
+        return command.end
+    return command.center if isinstance(command, FlyOrbit) else (math.nan, math.nan)

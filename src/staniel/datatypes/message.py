@@ -108,7 +108,17 @@ class Release(Message):
 
 @dataclass(frozen=True, slots=True)
 class Delivery:
-    """What became of one message: who could have heard it, who did."""
+    """What became of one message: who could have heard it, who does, now or later.
+
+    Attributes
+    ----------
+    message : Message
+    receivers : int
+        How many could have heard it; 0 where it never went on the air, since its sender's queue
+        was full.
+    heard_by : tuple of int
+        Who hears it, each once, however many copies come.
+    """
 
     message: Message
     receivers: int

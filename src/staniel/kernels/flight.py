@@ -7,8 +7,11 @@ Columns of a state row: x, y, z, heading, bank, speed. Columns of a command row 
 - `ORBIT`: center x, center y, radius, turn (+1 counter-clockwise);
 - `BANKS`: hold [s], count, and up to `MAX_BANKS` banks [rad].
 
-Columns of the limits: min_speed, max_speed, max_acceleration, max_climb, max_bank, max_roll_rate,
-roll_gain, course_gain.
+Columns of a limits row: min_speed, max_speed, max_acceleration, max_climb, max_bank, max_roll_rate,
+roll_gain, course_gain, speed_gain, climb_gain, altitude_gain.
+
+The autopilot steers its *course over ground*, which it measures: in wind it crabs. Without wind
+course and heading are the same number.
 """
 
 import math
@@ -37,15 +40,32 @@ def _wrapped(angle: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _line_rate(state: Array, command: Array, gain: float) -> float:
-    """Turn rate that follows a line: thesis algorithm 5.3 (corrected).
+def _over_ground(state: Array, east: float, north: float) -> tuple[float, float, float]:
+    """Course [rad], ground speed [m/s], and the heading's rate for one rad/s of the course's.
 
-    The carrot runs ``delta = 4 V / gain`` ahead of the foot of the perpendicular. With roll at
-    once, the cross-track error d obeys d'' + gain d' + gain V / delta d = 0, critically damped for
-    this delta. With first-order roll K the roots are those of s³ + K s² + K gain s + K gain²/4:
-    a slow real one and a pair, damped by 0.69 at K = 2 gain and better above.
+    In a steady wind course' = heading' V cos(crab) / V_g. The gearing is bounded for winds that
+    nearly stop the aircraft, where no course can be held anyway.
     """
-    x, y, speed = state[0], state[1], state[5]
+    if east == 0.0 and north == 0.0:
+        return state[3], state[5], 1.0
+    x = state[5] * math.cos(state[3]) + east
+    y = state[5] * math.sin(state[3]) + north
+    course, speed = math.atan2(y, x), math.hypot(x, y)
+    along = max(state[5] * math.cos(state[3] - course), 0.25 * state[5])
+    return course, speed, speed / along
+
+
+@njit(cache=True, error_model="numpy")
+def _line_rate(state: Array, command: Array, gain: float, course: float, speed: float) -> float:
+    """Rate of the course that follows a line: thesis algorithm 5.3 (corrected).
+
+    The carrot runs ``delta = 4 V / gain`` ahead of the foot of the perpendicular, V over ground.
+    With roll at once, the cross-track error d obeys d'' + gain d' + gain V / delta d = 0,
+    critically damped for this delta. With first-order roll K the roots are those of
+    s³ + K s² + K gain s + K gain²/4: a slow real one and a pair, damped by 0.69 at K = 2 gain and
+    better above.
+    """
+    x, y = state[0], state[1]
     start_x, start_y = command[3], command[4]
     along_x, along_y = command[5] - start_x, command[6] - start_y
     length = math.hypot(along_x, along_y)
@@ -55,13 +75,13 @@ def _line_rate(state: Array, command: Array, gain: float) -> float:
     else:
         ahead = 0.0  # No direction: the carrot stays at the point.
     carrot_x, carrot_y = start_x + ahead * along_x, start_y + ahead * along_y
-    rate: float = gain * _wrapped(math.atan2(carrot_y - y, carrot_x - x) - state[3])
+    rate: float = gain * _wrapped(math.atan2(carrot_y - y, carrot_x - x) - course)
     return rate
 
 
 @njit(cache=True, error_model="numpy")
-def _orbit_rate(state: Array, command: Array, gain: float) -> float:
-    r"""Turn rate that joins and keeps an orbit: thesis algorithm 5.3 (corrected).
+def _orbit_rate(state: Array, command: Array, gain: float, course: float, speed: float) -> float:
+    r"""Rate of the course that joins and keeps an orbit: thesis algorithm 5.3 (corrected).
 
     The carrot runs a look-ahead angle :math:`\lambda` ahead on the circle. From a place on the
     circle it lies :math:`\lambda/2` inside the tangent, so that much is taken off the course again
@@ -69,7 +89,7 @@ def _orbit_rate(state: Array, command: Array, gain: float) -> float:
     is added. What is left is zero on the orbit: no standing error of the radius. To first order the
     look-ahead distance is then 2 r tan(lambda/2); lambda makes it the line's 4 V / gain.
     """
-    x, y, speed = state[0] - command[3], state[1] - command[4], state[5]
+    x, y = state[0] - command[3], state[1] - command[4]
     radius, turn = command[5], command[6]
     distance = math.hypot(x, y)
     outside = max(distance, radius)
@@ -77,15 +97,15 @@ def _orbit_rate(state: Array, command: Array, gain: float) -> float:
     # Angle of the carrot's direction against the outward radius, for a counter-clockwise orbit.
     aside = math.atan2(radius * math.sin(2.0 * half), radius * math.cos(2.0 * half) - distance)
     aside -= half * radius / outside
-    error = _wrapped(math.atan2(y, x) + turn * aside - state[3])
+    error = _wrapped(math.atan2(y, x) + turn * aside - course)
     rate: float = gain * error + turn * speed / outside * max(0.0, math.sin(aside))
     return rate
 
 
 @njit(cache=True, error_model="numpy")
-def _bank_after(bank: float, wanted: float, gain: float, max_rate: float, time: float) -> float:
-    """Exact solution of bank' = clip(gain (wanted - bank), ±max_rate) after `time`."""
-    error = wanted - bank
+def _lagged(value: float, wanted: float, gain: float, max_rate: float, time: float) -> float:
+    """Exact solution of value' = clip(gain (wanted - value), ±max_rate) after `time`."""
+    error = wanted - value
     linear = max_rate / gain
     saturated = min(max((abs(error) - linear) / max_rate, 0.0), time)
     moved = math.copysign(saturated * max_rate, error)
@@ -94,31 +114,71 @@ def _bank_after(bank: float, wanted: float, gain: float, max_rate: float, time: 
 
 
 @njit(cache=True, error_model="numpy")
-def _wanted_bank(state: Array, command: Array, limits: Array, elapsed: float) -> float:
+def _vertical(height: float, climb: float, wanted: float, limits: Array) -> float:
+    """Vertical acceleration of the altitude hold, see `fly`."""
+    rate = limits[10] / limits[9] * (wanted - height)
+    force: float = limits[9] * (min(max(rate, -limits[3]), limits[3]) - climb)
+    return force
+
+
+@njit(cache=True, error_model="numpy")
+def _climbed(
+    height: float, climb: float, wanted: float, limits: Array, dt: float
+) -> tuple[float, float]:
+    """Height and climb rate one step later (Runge and Kutta, fourth order)."""
+    if height == wanted and climb == 0.0:
+        return height, climb
+    c1, half = climb, 0.5 * dt
+    a1 = _vertical(height, c1, wanted, limits)
+    c2 = climb + half * a1
+    a2 = _vertical(height + half * c1, c2, wanted, limits)
+    c3 = climb + half * a2
+    a3 = _vertical(height + half * c2, c3, wanted, limits)
+    c4 = climb + dt * a3
+    a4 = _vertical(height + dt * c3, c4, wanted, limits)
+    rise = dt / 6.0 * (c1 + 2.0 * c2 + 2.0 * c3 + c4)
+    gain = dt / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    return height + rise, climb + gain
+
+
+@njit(cache=True, error_model="numpy")
+def _wanted_bank(
+    state: Array, command: Array, limits: Array, east: float, north: float, elapsed: float
+) -> float:
     """Bank that the command asks for now, inside the bank limit."""
     kind = command[0]
     if kind == BANKS:
         step = min(int(elapsed / command[3] + 1e-9), int(command[4]) - 1)
         wanted = command[5 + step]
-    elif kind == ORBIT:
-        wanted = math.atan(state[5] * _orbit_rate(state, command, limits[7]) / _G)
     else:
-        wanted = math.atan(state[5] * _line_rate(state, command, limits[7]) / _G)
+        course, speed, gearing = _over_ground(state, east, north)
+        if kind == ORBIT:
+            rate = _orbit_rate(state, command, limits[7], course, speed)
+        else:
+            rate = _line_rate(state, command, limits[7], course, speed)
+        wanted = math.atan(state[5] * rate * gearing / _G)
     inside: float = min(max(wanted, -limits[4]), limits[4])
     return inside
 
 
 @njit(cache=True, error_model="numpy")
-def _step(state: Array, command: Array, limits: Array, elapsed: float, dt: float) -> None:
-    """One dynamics step of one aircraft, in place."""
-    wanted = _wanted_bank(state, command, limits, elapsed)
+def _step(
+    state: Array,
+    command: Array,
+    limits: Array,
+    east: float,
+    north: float,
+    elapsed: float,
+    dt: float,
+) -> None:
+    """One dynamics step of one aircraft, height excepted, in place; the wind is (east, north)."""
+    wanted = _wanted_bank(state, command, limits, east, north, elapsed)
     bank, speed, heading = state[4], state[5], state[3]
-    middle_bank = _bank_after(bank, wanted, limits[6], limits[5], 0.5 * dt)
-    end_bank = _bank_after(bank, wanted, limits[6], limits[5], dt)
-    change = min(max(command[1], limits[0]), limits[1]) - speed
-    most = limits[2] * dt
-    middle_speed = speed + min(max(change, -0.5 * most), 0.5 * most)
-    end_speed = speed + min(max(change, -most), most)
+    middle_bank = _lagged(bank, wanted, limits[6], limits[5], 0.5 * dt)
+    end_bank = _lagged(bank, wanted, limits[6], limits[5], dt)
+    wanted_speed = min(max(command[1], limits[0]), limits[1])
+    middle_speed = _lagged(speed, wanted_speed, limits[8], limits[2], 0.5 * dt)
+    end_speed = _lagged(speed, wanted_speed, limits[8], limits[2], dt)
     # Simpson's rule for heading, its companion for the half step, and Simpson again for the way.
     rate = _G / speed * math.tan(bank)
     middle_rate = _G / middle_speed * math.tan(middle_bank)
@@ -129,60 +189,81 @@ def _step(state: Array, command: Array, limits: Array, elapsed: float, dt: float
         speed * math.cos(heading)
         + 4.0 * middle_speed * math.cos(middle_heading)
         + end_speed * math.cos(end_heading)
-    ) * (dt / 6.0)
+    ) * (dt / 6.0) + east * dt
     state[1] += (
         speed * math.sin(heading)
         + 4.0 * middle_speed * math.sin(middle_heading)
         + end_speed * math.sin(end_heading)
-    ) * (dt / 6.0)
-    climb = limits[3] * dt
-    state[2] += min(max(command[2] - state[2], -climb), climb)
+    ) * (dt / 6.0) + north * dt
     state[3] = _wrapped(end_heading)
     state[4] = end_bank
     state[5] = end_speed
 
 
 @njit(cache=True, error_model="numpy")
-def fly(aircraft: Array, commands: Array, limits: Array, dt: float, substeps: int) -> Array:
+def fly(
+    aircraft: Array,
+    climbs: Array,
+    commands: Array,
+    limits: Array,
+    wind: Array,
+    dt: float,
+    substeps: int,
+) -> tuple[Array, Array]:
     r"""Fly every aircraft on its command for `substeps` dynamics steps.
 
     Parameters
     ----------
     aircraft : (n, 6) float array
         States before; not changed.
+    climbs : (n,) float array [m/s]
+        Climb rates before; not changed.
     commands : (n, `COMMAND_WIDTH`) float array
         See the module's head. A bank sequence begins with the call.
-    limits : (8,) float array
+    limits : (n, 11) float array
         See the module's head.
+    wind : (substeps, n, 2) float array [m/s]
+        Velocity of the air around each aircraft, to east and north, held over a step.
     dt : float [s]
     substeps : int
 
     Returns
     -------
-    (substeps, n, 6) float array
+    path : (substeps, n, 6) float array
         States after each step; headings in (-pi, pi].
+    climbs : (n,) float array [m/s]
+        After the last.
 
     Notes
     -----
     Thesis eq. 3.3 (corrected): :math:`\theta' = (g/V)\tan\varphi`,
     :math:`\varphi' = K(\varphi_c - \varphi)` with :math:`|\varphi| \le \varphi_{max}`,
-    :math:`|\varphi'| \le p_{max}`, :math:`|V'| \le a_{max}`. Bank and speed are integrated exactly,
-    heading and way by Simpson's rule; the command steers at the beginning of every step.
+    :math:`|\varphi'| \le p_{max}`; airspeed :math:`V' = k(V_c - V)` with
+    :math:`|V'| \le a_{max}`; velocity over ground is that through the air plus the wind's. Bank and
+    speed are integrated exactly, heading and way by Simpson's rule; the command steers at the
+    beginning of every step.
+
+    Height, thesis eq. 5.12 (corrected) with :math:`h'_c = 0`:
+    :math:`h'' = b'(\mathrm{clip}(b/b'\,(h_c - h)) - h')`, which is
+    :math:`b'(h'_c - h') + b(h_c - h)` unless that asked for more than the greatest climb rate.
     """
     n = aircraft.shape[0]
     path = np.empty((substeps, n, 6))
+    after = climbs.copy()
     for i in range(n):
         state = aircraft[i].copy()
         for k in range(substeps):
-            _step(state, commands[i], limits, k * dt, dt)
+            _step(state, commands[i], limits[i], wind[k, i, 0], wind[k, i, 1], k * dt, dt)
+            state[2], after[i] = _climbed(state[2], after[i], commands[i, 2], limits[i], dt)
             for c in range(6):  # a row at once costs seconds to compile
                 path[k, i, c] = state[c]
-    return path
+    return path, after
 
 
 def warm() -> None:
     """Compile, or load from the disk cache, what this module is flown with."""
-    limits = np.array([11.0, 20.0, 1.5, 3.0, 0.6, 1.0, 3.0, 1.2])
+    limits = np.array([[11.0, 20.0, 1.5, 3.0, 0.6, 1.0, 3.0, 1.2, 1.0, 1.0, 0.25]])
     command = np.zeros((1, COMMAND_WIDTH))
     command[0, 1] = 15.0
-    fly(np.array([[0.0, 0.0, 80.0, 0.0, 0.0, 15.0]]), command, limits, 0.1, 1)
+    start = np.array([[0.0, 0.0, 80.0, 0.0, 0.0, 15.0]])
+    fly(start, np.zeros(1), command, limits, np.zeros((1, 1, 2)), 0.1, 1)

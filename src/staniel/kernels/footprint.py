@@ -1,4 +1,4 @@
-"""What a body-fixed belly camera covers: its axis, its closed cone, and the one test of seeing."""
+"""What a camera covers: its axis, its closed cone, and the one test of seeing."""
 
 import math
 
@@ -8,9 +8,16 @@ from numpy.typing import NDArray
 
 from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
-__all__ = ["camera_axis", "in_cone", "look", "warm"]
+__all__ = ["BODY", "Mount", "camera_axes", "camera_axis", "in_cone", "look", "warm"]
 
 Array = NDArray[np.float64]
+Mount = tuple[float, float, float, float, float, float]
+"""How a camera sits in its aircraft: its axis in forward-left-up axes (a unit vector), 1.0 where
+these axes bank with the aircraft or 0.0 where they stay level, the height above ground [m] beyond
+which it sees nothing, and how far a gimbal swings from body-down [rad], or -1.0 without one."""
+
+BODY: Mount = (0.0, 0.0, -1.0, 1.0, math.inf, -1.0)
+"""A belly camera, fixed to the body."""
 
 _ROUNDING = 1e-12
 """Slack of the closed cone, relative to the distance: a boundary computed elsewhere is inside."""
@@ -18,7 +25,7 @@ _ROUNDING = 1e-12
 
 @njit(cache=True, error_model="numpy")
 def camera_axis(heading: float, bank: float) -> tuple[float, float, float]:
-    r"""Unit vector along which the camera looks, east-north-up.
+    r"""Unit vector along which a belly camera looks, east-north-up.
 
     :math:`R_z(\theta) R_x(-\varphi) (0, 0, -1)^T` in forward-left-up body axes, thesis eq. 4.2
     (corrected): in a left bank (positive) the camera swings to the right, away from the turn's
@@ -26,6 +33,69 @@ def camera_axis(heading: float, bank: float) -> tuple[float, float, float]:
     """
     aside = math.sin(bank)
     return math.sin(heading) * aside, -math.cos(heading) * aside, -math.cos(bank)
+
+
+@njit(cache=True, error_model="numpy")
+def _gimballed(pose: Array, x: float, y: float, limit: float) -> tuple[float, float, float]:
+    """Axis towards the ground point, or as near to it as `limit` from body-down lets.
+
+    Straight down is the wish where the point is NaN, or where the camera itself is.
+    """
+    dx, dy, dz = x - pose[0], y - pose[1], -pose[2]
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    if not distance > 0.0:
+        dx, dy, dz, distance = 0.0, 0.0, -1.0, 1.0
+    dx, dy, dz = dx / distance, dy / distance, dz / distance
+    down_x, down_y, down_z = camera_axis(pose[3], pose[4])
+    cosine = dx * down_x + dy * down_y + dz * down_z
+    # What of the wish is across body-down: its length is the sine of the angle between them.
+    side_x, side_y, side_z = dx - cosine * down_x, dy - cosine * down_y, dz - cosine * down_z
+    sine = math.sqrt(side_x * side_x + side_y * side_y + side_z * side_z)
+    if math.atan2(sine, cosine) <= limit or sine == 0.0:
+        return dx, dy, dz
+    a, b = math.cos(limit), math.sin(limit) / sine
+    return a * down_x + b * side_x, a * down_y + b * side_y, a * down_z + b * side_z
+
+
+@njit(cache=True, error_model="numpy")
+def camera_axes(aircraft: Array, looks: Array, mount: Mount) -> Array:
+    r"""Unit vectors along which mounted cameras look, east-north-up.
+
+    :math:`R_z(\theta) R_x(-\varphi) R_{mount} (0, 0, -1)^T`, thesis eq. 4.2 (corrected), without
+    the middle rotation where the mount stays level. A gimbal is stabilised and turns at once to the
+    ground point that it is to look at, within its limit from the aircraft's own down axis.
+
+    Parameters
+    ----------
+    aircraft : (n, 6) float array
+        x, y, z [m], heading, bank [rad], speed.
+    looks : (n, 2) float array [m]
+        Ground points for gimbals to look at, NaN for straight down; not read for other mounts.
+    mount : Mount
+
+    Returns
+    -------
+    (n, 3) float array
+        NaN where a camera sees nothing, because it is too high: no comparison with NaN is true.
+    """
+    forward, left, up, rolls, ceiling, limit = mount
+    axes = np.empty((aircraft.shape[0], 3))
+    for i in range(aircraft.shape[0]):
+        if aircraft[i, 2] > ceiling:
+            axes[i, 0] = axes[i, 1] = axes[i, 2] = math.nan
+            continue
+        if limit >= 0.0:
+            x, y, z = _gimballed(aircraft[i], looks[i, 0], looks[i, 1], limit)
+            axes[i, 0], axes[i, 1], axes[i, 2] = x, y, z
+            continue
+        bank = rolls * aircraft[i, 4]
+        cosine, sine = math.cos(bank), math.sin(bank)
+        aside = cosine * left + sine * up
+        east, north = math.cos(aircraft[i, 3]), math.sin(aircraft[i, 3])
+        axes[i, 0] = east * forward - north * aside
+        axes[i, 1] = north * forward + east * aside
+        axes[i, 2] = cosine * up - sine * left
+    return axes
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,7 +121,7 @@ def in_cone(
 
 @njit(cache=True, error_model="numpy")
 def look(
-    walls: Walls, aircraft: Array, points: Array, half_aperture: float, reach: float
+    walls: Walls, aircraft: Array, axes: Array, points: Array, half_aperture: float, reach: float
 ) -> NDArray[np.bool_]:
     """Which points each aircraft's camera sees: in its cone, in range, in free line of sight.
 
@@ -63,6 +133,8 @@ def look(
         Of the true city.
     aircraft : (n, 6) float array
         x, y, z [m], heading, bank [rad], speed.
+    axes : (n, 3) float array
+        Along which each camera looks, as of `camera_axes`.
     points : (m, 3) float array [m]
     half_aperture : float [rad]
     reach : float [m]
@@ -77,14 +149,15 @@ def look(
     cosine = math.cos(half_aperture)
     for i in range(n):
         x, y, z = aircraft[i, 0], aircraft[i, 1], aircraft[i, 2]
-        axis_x, axis_y, axis_z = camera_axis(aircraft[i, 3], aircraft[i, 4])
         for j in range(m):
             dx, dy, dz = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
-            if in_cone(dx, dy, dz, axis_x, axis_y, axis_z, cosine, reach):
+            if in_cone(dx, dy, dz, axes[i, 0], axes[i, 1], axes[i, 2], cosine, reach):
                 seen[i, j] = line_of_sight(walls, x, y, z, points[j, 0], points[j, 1], points[j, 2])
     return seen
 
 
 def warm() -> None:
     """Compile, or load from the disk cache, what this module is flown with."""
-    look(warm_walls(), np.zeros((1, 6)), np.zeros((1, 3)), 1.0, 1.0)
+    aircraft = np.zeros((1, 6))
+    axes = camera_axes(aircraft, np.zeros((1, 2)), BODY)
+    look(warm_walls(), aircraft, axes, np.zeros((1, 3)), 1.0, 1.0)

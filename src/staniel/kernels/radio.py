@@ -1,4 +1,4 @@
-"""Which broadcasts reach whom."""
+"""Which broadcasts reach whom, in how many copies and how late."""
 
 import math
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from staniel.kernels.random import fold, uniform
 
-__all__ = ["hear", "warm"]
+__all__ = ["fates", "hear", "warm"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,7 +62,60 @@ def hear(
     return heard
 
 
+@njit(cache=True, error_model="numpy")
+def fates(
+    heard: NDArray[np.bool_],
+    hidden: NDArray[np.bool_],
+    senders: NDArray[np.int64],
+    sequences: NDArray[np.int64],
+    loss: float,
+    jitter: float,
+    exponential: bool,
+    duplication: float,
+    key: np.uint64,
+) -> NDArray[np.float64]:
+    """Draw what becomes of each message on its way to those that `hear` let hear it.
+
+    Parameters
+    ----------
+    heard : (m, n) bool array
+    hidden : (n, n) bool array
+        Buildings stand between the two antennas.
+    senders, sequences : (m,) int array
+        As in `hear`; the draws differ from those there.
+    loss : float
+        Probability that a hidden receiver does not hear after all.
+    jitter : float [s]
+        The greatest, or the mean of an exponential.
+    exponential : bool
+    duplication : float
+        Probability that what is heard comes in a second copy, with a jitter of its own.
+    key : uint64
+
+    Returns
+    -------
+    (m, n, 2) float array [s]
+        Jitter of the first and of the second copy; infinite where there is none.
+    """
+    m, n = heard.shape
+    late = np.full((m, n, 2), np.inf)
+    for j in range(m):
+        sender = senders[j]
+        stream = fold(fold(fold(key, sender), sequences[j]), 1)
+        for i in range(n):
+            if not heard[j, i]:
+                continue
+            if hidden[sender, i] and uniform(stream, 4 * i) < loss:
+                continue
+            copies = 2 if uniform(stream, 4 * i + 1) < duplication else 1
+            for copy in range(copies):
+                draw = uniform(stream, 4 * i + 2 + copy)
+                late[j, i, copy] = jitter * (-math.log1p(-draw) if exponential else draw)
+    return late
+
+
 def warm() -> None:
     """Compile, or load from the disk cache, what this module is flown with."""
     index = np.zeros(1, dtype=np.int64)
-    hear(np.zeros((1, 6)), index, index, 1.0, 1.0, np.uint64(0))
+    heard = hear(np.zeros((1, 6)), index, index, 1.0, 1.0, np.uint64(0))
+    fates(heard, heard, index, index, 0.0, 0.0, False, 0.0, np.uint64(0))

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["bits", "fold", "normals", "uniform"]
+__all__ = ["bits", "fold", "normals", "uniform", "warm"]
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -95,3 +95,8 @@ def normals(key: np.uint64, first: int, out: NDArray[np.float32]) -> None:
         sign_sin = _F1 - np.float32(quarter & np.int32(2))
         out[i] = radius * sign_cos * (sin if odd else cos)
         out[half + i] = radius * sign_sin * (cos if odd else sin)
+
+
+def warm() -> None:
+    """Compile, or load from the cache, what is called from Python in a flight."""
+    uniform(np.uint64(fold(np.uint64(0), 0)), 0)

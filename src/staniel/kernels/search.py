@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from staniel.kernels.footprint import camera_axis, in_cone
+from staniel.kernels.footprint import BODY, camera_axes, in_cone
 from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
 __all__ = ["choose", "mark", "warm"]
@@ -19,6 +19,7 @@ def mark(
     places: NDArray[np.float64],
     cell: float,
     poses: NDArray[np.float64],
+    axes: NDArray[np.float64],
     half_aperture: float,
     reach: float,
     time: float,
@@ -37,6 +38,8 @@ def mark(
         Side of a cell; the map's corner is the origin.
     poses : (k, 6) float array
         Aircraft poses as in `Truth.aircraft`.
+    axes : (k, 3) float array
+        Along which their cameras look; NaN where one sees nothing.
     half_aperture : float [rad]
     reach : float [m]
         Greatest slant range.
@@ -46,7 +49,7 @@ def mark(
     cosine = math.cos(half_aperture)
     for k in range(poses.shape[0]):
         x, y, z = poses[k, 0], poses[k, 1], poses[k, 2]
-        axis_x, axis_y, axis_z = camera_axis(poses[k, 3], poses[k, 4])
+        axis_x, axis_y, axis_z = axes[k, 0], axes[k, 1], axes[k, 2]
         first_column = max(0, int((x - reach) / cell))
         last_column = min(columns, int((x + reach) / cell) + 1)
         for row in range(max(0, int((y - reach) / cell)), min(rows, int((y + reach) / cell) + 1)):
@@ -111,5 +114,6 @@ def warm() -> None:
     """Compile, or load from the cache, what a flight calls."""
     looked, places = np.zeros((1, 1)), np.zeros((1, 1, 3))
     pose = np.array([[0.0, 0.0, 10.0, 0.0, 0.0, 15.0]])
-    mark(warm_walls(), looked, places, 1.0, pose, 1.0, 50.0, 1.0)
+    axes = camera_axes(pose, np.zeros((1, 2)), BODY)
+    mark(warm_walls(), looked, places, 1.0, pose, axes, 1.0, 50.0, 1.0)
     choose(looked, places, pose[0], 30.0, np.zeros((1, 2)), 100.0, 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from staniel.kernels.footprint import look
+from staniel.kernels.footprint import BODY, Mount, camera_axes, look
 from staniel.kernels.walls import Walls, warm_walls
 
 __all__ = ["seen_by", "warm"]
@@ -20,6 +20,8 @@ def seen_by(
     height: float,
     half_aperture: float,
     reach: float,
+    mount: Mount,
+    looks: Floats,
 ) -> NDArray[np.int64]:
     """Count the aircraft that have each vehicle in their footprint, in range and in free sight.
 
@@ -35,6 +37,10 @@ def seen_by(
     half_aperture : float [rad]
     reach : float [m]
         The camera's greatest slant range.
+    mount : Mount
+        How the cameras sit in the aircraft.
+    looks : (t, n, 2) float array [m]
+        Where gimbals look, as in `camera_axes`.
 
     Returns
     -------
@@ -48,13 +54,15 @@ def seen_by(
         for k in range(count):
             points[k, 0] = vehicles[t, k, 0]
             points[k, 1] = vehicles[t, k, 1]
-        looks = look(walls, aircraft[t], points, half_aperture, reach)
-        for o in range(looks.shape[0]):
+        axes = camera_axes(aircraft[t], looks[t], mount)
+        views = look(walls, aircraft[t], axes, points, half_aperture, reach)
+        for o in range(views.shape[0]):
             for k in range(count):
-                seen[t, k] += looks[o, k]
+                seen[t, k] += views[o, k]
     return seen
 
 
 def warm() -> None:
     """Compile, or load from the cache, what a flight calls."""
-    seen_by(warm_walls(), np.zeros((1, 1, 6)), np.zeros((1, 1, 4)), 1.0, 1.0, 1.0)
+    aircraft, vehicles, looks = (np.zeros((1, 1, columns)) for columns in (6, 4, 2))
+    seen_by(warm_walls(), aircraft, vehicles, 1.0, 1.0, 1.0, BODY, looks)

@@ -1,42 +1,32 @@
-"""Compile every kernel, or load it from the cache on disk, before the first tick."""
+"""Compile the kernels that a mission calls, or load them from the cache, before it starts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib import import_module
 
-from staniel.kernels import (
-    association,
-    births,
-    camera,
-    dubins,
-    flight,
-    footprint,
-    particles,
-    radio,
-    search,
-    traffic,
-    visibility,
-    walls,
-)
 from staniel.kernels.cache import drop_stale
 
 __all__ = ["warm_all"]
 
-_MODULES = (
-    walls,
-    footprint,
-    camera,
-    flight,
-    traffic,
-    radio,
-    dubins,
-    particles,
-    association,
-    births,
-    search,
-    visibility,
+ALWAYS = (
+    "random",
+    "walls",
+    "footprint",
+    "camera",
+    "flight",
+    "streets",
+    "traffic",
+    "radio",
+    "dubins",
+    "particles",
+    "association",
+    "births",
+    "search",
+    "visibility",
 )
+"""What every mission calls. Others are named by the scenario that uses them."""
 
 
-def warm_all(report: Callable[[int, int], None]) -> None:
+def warm_all(report: Callable[[int, int], None], others: Sequence[str] = ()) -> None:
     """Call each kernel once on tiny arrays.
 
     The first time on a machine this compiles, for tens of seconds; then it takes a fraction of one.
@@ -45,9 +35,12 @@ def warm_all(report: Callable[[int, int], None]) -> None:
     ----------
     report : callable
         ``report(done, total)``, before each module of kernels and once at the end.
+    others : sequence of str, optional
+        Modules of `staniel.kernels` beside those that every mission calls.
     """
     drop_stale()
-    for done, module in enumerate(_MODULES):
-        report(done, len(_MODULES))
-        module.warm()
-    report(len(_MODULES), len(_MODULES))
+    names = [*ALWAYS, *others]
+    for done, name in enumerate(names):
+        report(done, len(names))
+        import_module(f"staniel.kernels.{name}").warm()
+    report(len(names), len(names))

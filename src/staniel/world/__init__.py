@@ -1,8 +1,23 @@
 """The truth: traffic, aircraft, camera and radio as they are, which no agent ever sees."""
 
 from staniel.world.camera import Cameras
-from staniel.world.config import Traffic
+from staniel.world.config import Faults, Launch, Traffic, Wind
+from staniel.world.faults import impair
+from staniel.world.lidar import Lidars
 from staniel.world.radio import Radio
+from staniel.world.risk import Exposure, Hazards
 from staniel.world.world import World
 
-__all__ = ["Cameras", "Radio", "Traffic", "World"]
+__all__ = [
+    "Cameras",
+    "Exposure",
+    "Faults",
+    "Hazards",
+    "Launch",
+    "Lidars",
+    "Radio",
+    "Traffic",
+    "Wind",
+    "World",
+    "impair",
+]

@@ -63,17 +63,32 @@ def _banks(command: FlyBanks) -> tuple[float, ...]:
     return (BANKS, command.speed, command.altitude, command.hold, count, *command.banks)
 
 
-def limits(airframe: Airframe) -> NDArray[np.float64]:
-    """Row of limits for `staniel.kernels.flight.fly`: see the head of that module."""
-    return np.array(
-        [
-            airframe.min_speed,
-            airframe.max_speed,
-            airframe.max_acceleration,
-            airframe.max_climb,
-            airframe.max_bank,
-            math.radians(airframe.max_roll_rate_deg),
-            airframe.roll_gain,
-            airframe.course_gain,
-        ]
+def limits(airframes: Sequence[Airframe]) -> NDArray[np.float64]:
+    """Rows of limits for `staniel.kernels.flight.fly`: see the head of that module.
+
+    Parameters
+    ----------
+    airframes : sequence of Airframe
+        One an aircraft.
+
+    Returns
+    -------
+    (n, 11) float array
+    """
+    return np.array([_limits(airframe) for airframe in airframes], dtype=np.float64)
+
+
+def _limits(airframe: Airframe) -> tuple[float, ...]:
+    return (
+        airframe.min_speed,
+        airframe.max_speed,
+        airframe.max_acceleration,
+        airframe.max_climb,
+        airframe.max_bank,
+        math.radians(airframe.max_roll_rate_deg),
+        airframe.roll_gain,
+        airframe.course_gain,
+        airframe.speed_gain,
+        airframe.climb_gain,
+        airframe.altitude_gain,
     )

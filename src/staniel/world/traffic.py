@@ -6,11 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
+from staniel.datatypes.clock import Clock
 from staniel.errors import CityError, ScenarioError
-from staniel.kernels.traffic import MEMORY_WIDTH, place, streets
+from staniel.kernels.random import fold, uniform
+from staniel.kernels.streets import place, streets
+from staniel.kernels.traffic import MEMORY_WIDTH, ROOM, drive
 from staniel.world.config import Traffic
 
-__all__ = ["TRIES", "begin", "habits"]
+__all__ = ["TRIES", "Wanderers", "begin", "habits", "speeds"]
 
 TRIES = 20_000
 """Random places that are tried for each vehicle before the scenario is refused."""
@@ -18,11 +21,72 @@ TRIES = 20_000
 _MOST_NODES = 1_000_000  # of the grid on which streets are joined: about half a second
 
 
+_SPEEDS = 1 << 40  # sub-stream of a key from which vehicles draw their speeds
+
+
+class Wanderers:
+    """Differential-drive vehicles that wander the streets on two forward feelers (thesis 4.2).
+
+    Parameters
+    ----------
+    city : City
+    traffic : Traffic
+    clock : Clock
+    place_key, drive_key : uint64
+        Of the draws before and during the mission.
+    """
+
+    def __init__(
+        self,
+        city: City,
+        traffic: Traffic,
+        clock: Clock,
+        place_key: np.uint64,
+        drive_key: np.uint64,
+    ) -> None:
+        self._city = city
+        self._traffic = traffic
+        self._clock = clock
+        self._keys = place_key, drive_key
+        self._habits = habits(traffic)
+        self._speeds = speeds(traffic, place_key)
+
+    def begin(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """See `staniel.world.traffic.begin`."""
+        return begin(self._city, self._traffic, self._keys[0])
+
+    def drive(
+        self, vehicles: NDArray[np.float64], memory: NDArray[np.float64], tick: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """See `staniel.kernels.traffic.drive`."""
+        clock = self._clock
+        return drive(
+            self._city.walls,
+            vehicles,
+            memory,
+            self._habits,
+            self._speeds,
+            self._keys[1],
+            tick,
+            clock.dynamics_step,
+            clock.substeps,
+        )
+
+
+def speeds(traffic: Traffic, key: np.uint64) -> NDArray[np.float64]:
+    """(count,) speed of each vehicle on a clear way [m/s]: all the same, or each its own."""
+    if traffic.speed_range is None:
+        return np.full(traffic.count, traffic.speed)
+    low, high = traffic.speed_range
+    stream = fold(np.uint64(key), _SPEEDS)
+    draws = [uniform(stream, i) for i in range(traffic.count)]
+    return low + (high - low) * np.array(draws, dtype=np.float64)
+
+
 def habits(traffic: Traffic) -> NDArray[np.float64]:
     """Row of habits for `staniel.kernels.traffic.drive`: see the head of that module."""
     return np.array(
         [
-            traffic.speed,
             traffic.radius,
             traffic.axle,
             traffic.feeler_length,
@@ -82,4 +146,6 @@ def begin(
         )
     vehicles = np.zeros((traffic.count, 4))
     vehicles[:, :3] = places
-    return vehicles, np.zeros((traffic.count, MEMORY_WIDTH))
+    memory = np.zeros((traffic.count, MEMORY_WIDTH))
+    memory[:, ROOM] = -1.0  # nothing surveyed
+    return vehicles, memory

@@ -1,26 +1,20 @@
 """The truth: how it begins and how it goes on from tick to tick."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from staniel.city import City
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import Command
+from staniel.datatypes.command import Command, look_point
 from staniel.datatypes.equipment import Airframe
 from staniel.datatypes.truth import Truth
 from staniel.errors import ScenarioError
-from staniel.kernels.flight import fly
-from staniel.kernels.traffic import drive
-from staniel.world.aircraft import encode, limits
-from staniel.world.config import Traffic
-from staniel.world.traffic import begin, habits
+from staniel.world.config import Faults, Launch, Traffic, Wind
+from staniel.world.drivers import drivers_of
+from staniel.world.fleet import Fleet
 
 __all__ = ["World"]
-
-_INSET = 30.0  # how far inside the city's rectangle the aircraft start [m]
 
 
 class World:
@@ -41,11 +35,19 @@ class World:
     clock : Clock
     seed : numpy.random.SeedSequence
         Of the world's own streams.
+    wind : Wind, optional
+        Calm when not given.
+    faults : Faults, optional
+    launch : Launch, optional
+        In the air around the city when not given.
+    airframes : sequence of Airframe, optional
+        One an aircraft, where they are not all of one kind; then `airframe` does not count.
 
     Raises
     ------
     ScenarioError
-        No aircraft, or aircraft that would not fly above the tallest roof.
+        No aircraft, aircraft that would not fly above the tallest roof, a wind as fast as they, a
+        fault of an aircraft that is not there; roads or recorded tracks that cannot be used.
     """
 
     def __init__(
@@ -56,22 +58,22 @@ class World:
         traffic: Traffic,
         clock: Clock,
         seed: np.random.SeedSequence,
+        *,
+        wind: Wind = Wind(),  # noqa: B008 - frozen
+        faults: Faults = Faults(),  # noqa: B008
+        launch: Launch = Launch(),  # noqa: B008
+        airframes: Sequence[Airframe] | None = None,
     ) -> None:
         if aircraft_count < 1:
             raise ScenarioError(f"aircraft count = {aircraft_count}: expected at least 1")
-        if airframe.altitude <= city.tallest:
-            raise ScenarioError(
-                f"aircraft.altitude = {airframe.altitude:g} m: expected above the tallest roof "
-                f"({city.tallest:g} m), since aircraft do not avoid buildings"
-            )
-        self._city = city
-        self._airframe = airframe
-        self._aircraft_count = aircraft_count
-        self._traffic = traffic
+        airframes = airframes or [airframe] * aircraft_count
+        for one in airframes:
+            _check(one, city.tallest, wind.speed)
         self._clock = clock
-        self._limits = limits(airframe)
-        self._habits = habits(traffic)
-        self._place_key, self._drive_key = seed.generate_state(2, np.uint64)
+        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 0))
+        self._fleet = Fleet(city, airframes, clock, own, wind, faults, launch)
+        place_key, drive_key = seed.generate_state(2, np.uint64)
+        self._drivers = drivers_of(city, traffic, clock, place_key, drive_key)
 
     def start(self) -> Truth:
         """The truth at tick 0; its paths hold this one instant.
@@ -80,7 +82,8 @@ class World:
         -------
         Truth
             Aircraft spread evenly along the rectangle's perimeter, 30 m inside it, level, at cruise
-            speed and altitude, heading for the centre; vehicles at rest at random free places.
+            speed and altitude, heading for the centre, or on the ground where the launch says so;
+            vehicles at rest at random free places, or where their recorded tracks begin.
 
         Raises
         ------
@@ -89,9 +92,11 @@ class World:
         ScenarioError
             A vehicle for which no place was found.
         """
-        vehicles, memory = begin(self._city, self._traffic, self._place_key)
-        aircraft = self._perimeter()
-        return Truth(0, 0.0, aircraft, vehicles, memory, aircraft[None], vehicles[None])
+        vehicles, memory = self._drivers.begin()
+        aircraft, condition, wind = self._fleet.start()
+        return Truth(
+            0, 0.0, aircraft, vehicles, memory, aircraft[None], vehicles[None], condition, wind
+        )
 
     def advance(self, truth: Truth, commands: Sequence[Command]) -> Truth:
         """The truth one decision step later.
@@ -114,18 +119,8 @@ class World:
         """
         if len(commands) != len(truth.aircraft):
             raise ValueError(f"got {len(commands)} commands for {len(truth.aircraft)} aircraft")
-        dt, substeps = self._clock.dynamics_step, self._clock.substeps
-        aircraft_path = fly(truth.aircraft, encode(commands), self._limits, dt, substeps)
-        vehicle_path, memory = drive(
-            self._city.walls,
-            truth.vehicles,
-            truth.traffic,
-            self._habits,
-            self._drive_key,
-            truth.tick,
-            dt,
-            substeps,
-        )
+        aircraft_path, condition, wind = self._fleet.advance(truth, commands)
+        vehicle_path, memory = self._drivers.drive(truth.vehicles, truth.traffic, truth.tick)
         tick = truth.tick + 1
         return Truth(
             tick,
@@ -135,31 +130,19 @@ class World:
             memory,
             aircraft_path,
             vehicle_path,
+            condition,
+            wind,
+            np.array([look_point(command) for command in commands]),
         )
 
-    def _perimeter(self) -> NDArray[np.float64]:
-        """(n, 6) starting states, counter-clockwise from the south-west corner."""
-        width, height = self._city.size
-        inset = min(_INSET, 0.25 * width, 0.25 * height)
-        east, north = width - 2.0 * inset, height - 2.0 * inset
-        states = np.zeros((self._aircraft_count, 6))
-        for i in range(self._aircraft_count):
-            way = 2.0 * (east + north) * i / self._aircraft_count
-            if way < east:
-                x, y = way, 0.0
-            elif way < east + north:
-                x, y = east, way - east
-            elif way < 2.0 * east + north:
-                x, y = 2.0 * east + north - way, north
-            else:
-                x, y = 0.0, 2.0 * (east + north) - way
-            heading = math.atan2(0.5 * north - y, 0.5 * east - x)
-            states[i] = (
-                inset + x,
-                inset + y,
-                self._airframe.altitude,
-                heading,
-                0.0,
-                self._airframe.speed,
-            )
-        return states
+
+def _check(airframe: Airframe, tallest: float, wind: float) -> None:
+    if airframe.altitude <= tallest:
+        raise ScenarioError(
+            f"aircraft.altitude = {airframe.altitude:g} m: expected above the tallest roof "
+            f"({tallest:g} m), since aircraft do not avoid buildings"
+        )
+    if wind >= airframe.speed:
+        raise ScenarioError(
+            f"wind.speed = {wind:g} m/s: expected below aircraft.speed = {airframe.speed:g} m/s"
+        )

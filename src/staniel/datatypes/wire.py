@@ -1,0 +1,67 @@
+"""How long each message is on the air, in bytes, for radios whose bandwidth is limited.
+
+An estimate of a compact binary format, not the format of any wire of ours:
+
+=============  =====================================================================================
+part           bytes
+=============  =====================================================================================
+head           16: kind 1, length 1, sender 2, sequence 4, time 8; every message has it
+track name     14: born 8, founder 2, serial 4
+point, cost    8 (two 4-byte numbers), 4
+pose           24 (six 4-byte numbers)
+heartbeat      head, pose, role 1, goal, track name, point, cost
+report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
+announce       head, track name, point, course 4, cost
+bid            head, track name, auctioneer 2, cost
+award          head, track name, point, winner 2, cost
+revoke         head, two track names, auctioneer 2, point, cost
+release        head, track name, point, lost 1
+=============  =====================================================================================
+"""
+
+from typing import Final
+
+from staniel.datatypes.message import (
+    Announce,
+    Award,
+    Bid,
+    Heartbeat,
+    Message,
+    Release,
+    Report,
+    Revoke,
+)
+
+__all__ = ["HEAD", "SIGHTING", "wire_size"]
+
+HEAD: Final = 16
+"""What every message has [byte]."""
+
+SIGHTING: Final = 54
+"""What each sighting adds to a report [byte]."""
+
+_NAME, _POINT, _COST, _POSE = 14, 8, 4, 24
+
+_SIZES: Final[dict[type[Message], int]] = {
+    Heartbeat: HEAD + _POSE + 1 + _POINT + _NAME + _POINT + _COST,
+    Report: HEAD,
+    Announce: HEAD + _NAME + _POINT + 4 + _COST,
+    Bid: HEAD + _NAME + 2 + _COST,
+    Award: HEAD + _NAME + _POINT + 2 + _COST,
+    Revoke: HEAD + 2 * _NAME + 2 + _POINT + _COST,
+    Release: HEAD + _NAME + _POINT + 1,
+}
+
+
+def wire_size(message: Message) -> int:
+    """Bytes of a message on the air; of a kind that the table lacks, its head's.
+
+    Examples
+    --------
+    >>> wire_size(Report(0, 1, 5.0, sightings=()))
+    16
+    """
+    size = _SIZES.get(type(message), HEAD)
+    if isinstance(message, Report):
+        size += SIGHTING * len(message.sightings)
+    return size
