@@ -13,22 +13,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 from rich.console import Console
 from rich.table import Table
-from shapely import STRtree
 
+import sight
 from staniel.agent import Agent
 from staniel.city import City
 from staniel.kernels import dubins
 from staniel.kernels.random import normals
-from staniel.kernels.walls import visible_pairs
 from staniel.kernels.warm import warm_all
 from staniel.mission import Mission
 from staniel.recording import Recorder
 from staniel.scenario import Scenario, build_city, load_scenario
 from staniel.scenario.assemble import assemble
 from staniel.tracking import Tracker, TrackingConfig
+from world import world_tick
 
 CONSOLE = Console()
 
@@ -160,38 +159,6 @@ def race(title: str, unit: str, per: float, rivals: dict[str, Callable[[], Any]]
     CONSOLE.print(table)
 
 
-def sight(n: int) -> None:
-    """Line of sight against shapely's tree on the same segments."""
-    city = City.generate(size=(1000.0, 1000.0), density=0.3, block=(25.0, 45.0), seed=1)
-    rng = np.random.default_rng(0)
-    count = 20_000
-    a = np.column_stack([rng.uniform(0, 1000, (count, 2)), np.full(count, 80.0)])
-    offset = rng.uniform(-140, 140, (count, 2))
-    b = np.column_stack([np.clip(a[:, :2] + offset, 0, 1000), np.full(count, 1.0)])
-    tree, heights = STRtree(city.outlines), np.asarray(city.heights)
-
-    def by_tree() -> np.ndarray:
-        """Candidates by the tree; the overlap's lower end against the roof, as arrays."""
-        lines = shapely.linestrings(np.stack([a[:, :2], b[:, :2]], axis=1))
-        segment, building = tree.query(lines, predicate="intersects")
-        inside = shapely.intersection(
-            lines[segment], np.asarray(city.outlines, dtype=object)[building]
-        )
-        # The ray falls towards b: the overlap's far end is its lowest.
-        far = shapely.hausdorff_distance(inside, shapely.points(a[segment, :2]))
-        length = np.maximum(np.hypot(*(b - a)[segment, :2].T), 1e-12)
-        z = a[segment, 2] + (b - a)[segment, 2] * np.minimum(far / length, 1.0)
-        blocked = (z < heights[building]) & (shapely.length(inside) > 1e-9)
-        clear = np.ones(count, dtype=bool)
-        clear[segment[blocked]] = False
-        return clear
-
-    agree = np.count_nonzero(visible_pairs(city.walls, a, b) == by_tree())
-    CONSOLE.print(f"{len(city.outlines)} buildings; {agree} of {count} answers agree with shapely")
-    rivals = {"staniel": lambda: visible_pairs(city.walls, a, b), "shapely STRtree": by_tree}
-    race("line of sight, 80 m to ground", "µs per segment", 1e-6 * count, rivals, n)
-
-
 def particle_step(n: int) -> None:
     """The tracker's step against the same filter in NumPy."""
     tracks, size = 4, 1000
@@ -279,8 +246,9 @@ def main() -> None:
     mission_speed(3 if quick else 10)
     stage_times(1 if quick else 5)
     particle_step(50 if quick else 300)
-    sight(3 if quick else 10)
+    sight.compare((100, 1_000) if quick else (100, 1_000, 10_000), 3 if quick else 15)
     small_kernels(5 if quick else 20)
+    world_tick([1000, 3000, 10_000], ticks=10 if quick else 30)
     scaling([4, 16, 64] if quick else [4, 16, 64, 128], 20 if quick else 60)
 
 

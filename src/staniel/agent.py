@@ -17,6 +17,7 @@ from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyLine
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Heartbeat, Message, Point, Report
+from staniel.datatypes.risk import RiskRegion
 from staniel.guidance import GuidanceConfig, Pursuit, loiter, pursuit_policy_named
 from staniel.kernels.dubins import lengths
 from staniel.tracking import Tracker, TrackingConfig
@@ -35,6 +36,7 @@ class Briefing:
     tracking: TrackingConfig
     cooperation: CooperationConfig
     guidance: GuidanceConfig
+    risk: tuple[RiskRegion, ...] = ()
 
 
 class Agent:
@@ -128,6 +130,8 @@ class Agent:
             self._briefing.airframe.min_turn_radius,
         ).tolist()
         own = [tuple(sighting.position.tolist()) for sighting in percept.sightings]
+        # Sightings may be older than the percept that hands them out.
+        looked = min((sighting.time for sighting in percept.sightings), default=math.inf)
         near = self._briefing.cooperation.same_target
         return [
             Task(
@@ -135,7 +139,7 @@ class Agent:
                 (x, y),
                 course,
                 cost,
-                track.last_seen >= percept.time and any(math.dist((x, y), z) < near for z in own),
+                track.last_seen >= looked and any(math.dist((x, y), z) < near for z in own),
             )
             for track, (x, y, course), cost in zip(tracks, goals, costs, strict=True)
         ]
@@ -145,7 +149,11 @@ class Agent:
     ) -> tuple[Command, str, Point]:
         """Pursue the held target; else loiter where one was lost; else search."""
         heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
-        self._search.look(time, [pose, *(message.pose for message in heartbeats)])
+        self._search.look(
+            time,
+            [pose, *(message.pose for message in heartbeats)],
+            [self.belief.goal, *(message.goal for message in heartbeats)],
+        )
         held, guidance = self._allocation.holding, self._briefing.guidance
         if held is not None:
             track = self._track_named(held.id)

@@ -7,6 +7,7 @@ tables and errors go to standard error.
 
 import json
 import signal
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -63,7 +64,7 @@ Settings = Annotated[
 # Numbers are read as text and checked with the scenario: its messages name value and expectation.
 Seed = Annotated[str | None, typer.Option(metavar="N", help="Seed of the run.")]
 CityFile = Annotated[
-    str | None, typer.Option("--city", metavar="FILE", help="Map: an image or a Moving AI .map.")
+    str | None, typer.Option("--city", metavar="FILE", help="Map: image, Moving AI .map, .geojson.")
 ]
 Cell = Annotated[
     str | None, typer.Option(metavar="METRES", help="Metres per pixel or grid cell of the map.")
@@ -76,7 +77,21 @@ RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a reco
 
 def main() -> None:
     """Entry point of the `staniel` command."""
+    warnings.formatwarning = _warning_line
     app()
+
+
+def _warning_line(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    line: str | None = None,
+) -> str:
+    """Our own warnings are for people; the others keep the place that they come from."""
+    if category.__module__.startswith("staniel."):
+        return f"warning: {message}\n"
+    return f"{filename}:{lineno}: {category.__name__}: {message}\n"
 
 
 def _print_version(wanted: bool) -> None:
@@ -223,8 +238,10 @@ def _load(
 
     changes: list[str | tuple[str, Any]] = list(settings or [])
     if city is not None:
-        # Images are recognised by their content, grids only by their name.
-        source = "grid" if city.lower().endswith(".map") else "image"
+        # Images are recognised by their content, all else only by its name.
+        source = {".map": "grid", ".geojson": "geojson", ".json": "geojson"}.get(
+            Path(city).suffix.lower(), "image"
+        )
         changes.append(("city", {"source": source, "file": city}))
     named = {"seed": seed, "minutes": minutes, "city.cell": cell}
     changes += [(key, _number(text)) for key, text in named.items() if text is not None]

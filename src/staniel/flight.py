@@ -21,7 +21,7 @@ from staniel.mission import Mission
 from staniel.record import Record
 from staniel.recording import Recorder, read_record, tracks_table, truth_table
 from staniel.scenario import Scenario, build_city, dump_scenario, load_scenario
-from staniel.scenario.assemble import assemble
+from staniel.scenario.assemble import assemble, kernels_of
 
 __all__ = ["Run", "fly", "replay"]
 
@@ -112,8 +112,8 @@ def fly(
     if out is not None:
         check_folder(Path(out))  # A refusal should not have to wait for the kernels.
     city = build_city(scenario.city, scenario.seed)
+    warm_all(lambda done, total: tell("compiling", done=done, total=total), kernels_of(scenario))
     mission = assemble(scenario, city)
-    warm_all(lambda done, total: tell("compiling", done=done, total=total))
     folder = claim_folder(out)
     _write_text(folder / SCENARIO, dump_scenario(scenario, __version__))
     with Recorder(

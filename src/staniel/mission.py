@@ -8,13 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from staniel.agent import Agent
-from staniel.datatypes.command import Command
+from staniel.datatypes.belief import Belief
+from staniel.datatypes.command import Command, FlyBanks
 from staniel.datatypes.message import Message
-from staniel.datatypes.truth import Truth
+from staniel.datatypes.truth import FLYING, Truth
 from staniel.record import Frame
-from staniel.world import Cameras, Radio, World
+from staniel.world import Cameras, Lidars, Radio, World, impair
 
 __all__ = ["Mission"]
+
+_NO_COMMAND = FlyBanks((0.0,), 1.0, 0.0, 0.0)
+_NO_BELIEF = Belief((), "down", None, (0.0, 0.0))
 
 
 @dataclass(slots=True)
@@ -35,6 +39,8 @@ class Mission:
         Where everything stands before anything moved.
     ticks : int
         Decision steps until the end.
+    lidars : Lidars, optional
+        What each aircraft measures of the walls at its height.
     """
 
     world: World
@@ -43,6 +49,7 @@ class Mission:
     agents: list[Agent]
     start: Truth
     ticks: int
+    lidars: Lidars | None = None
 
     def frames(self) -> Iterator[Frame]:
         """Fly the mission, a frame a tick; the first is the start itself, before anything moved."""
@@ -53,11 +60,18 @@ class Mission:
             if tick > 0:
                 truth = self.world.advance(truth, commands)
             percepts, origins = self.cameras.sense(truth)
+            if self.lidars is not None:
+                percepts = self.lidars.sense(truth, percepts)
+            percepts, origins = impair(percepts, origins, truth)
             inboxes, deliveries = self.radio.deliver(outboxes, truth)
-            commands, outboxes = [], []
-            for agent, percept, inbox in zip(self.agents, percepts, inboxes, strict=True):
-                command, outbox = agent.step(percept, inbox)
+            flying = truth.condition[:, FLYING].tolist()
+            commands, outboxes, beliefs = [], [], []
+            for agent, percept, inbox, flies in zip(
+                self.agents, percepts, inboxes, flying, strict=True
+            ):
+                # Before its launch, and once it is lost, an aircraft has no mind.
+                command, outbox = agent.step(percept, inbox) if flies else (_NO_COMMAND, [])
                 commands.append(command)
                 outboxes.append(outbox)
-            beliefs = [agent.belief for agent in self.agents]
+                beliefs.append(agent.belief if flies else _NO_BELIEF)
             yield Frame(truth, percepts, origins, deliveries, commands, beliefs)

@@ -1,17 +1,20 @@
 """What one tick and one run hold: the frame that is recorded, the record that is read back."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from staniel.city import City
 from staniel.datatypes.belief import Belief, Percept
 from staniel.datatypes.command import Command
 from staniel.datatypes.message import Delivery
-from staniel.datatypes.truth import Truth
+from staniel.datatypes.risk import RiskConfig
+from staniel.datatypes.truth import CONDITION_COLUMNS, Truth, nominal
+from staniel.errors import RecordError
 
 __all__ = [
     "COMMAND_DTYPE",
@@ -39,7 +42,8 @@ class Frame:
     origins : sequence of tuple of int
         Per percept and sighting the vehicle that caused it, -1 for a false alarm.
     deliveries : sequence of Delivery
-        The messages that arrived in this tick, or were lost on the way to it.
+        The messages that went on the air on the way to this tick and whom they reach, at once or
+        later; and those that were dropped before.
     commands : sequence of Command
         Decided in this tick, one an aircraft.
     beliefs : sequence of Belief
@@ -70,6 +74,8 @@ MESSAGE_DTYPE = _columns(
 COMMAND_DTYPE = _columns(
     "time:f8 agent:i4 kind:U8 ax:f8 ay:f8 bx:f8 by:f8 radius:f8 turn:i4 speed:f8 altitude:f8"
 )
+_SAME = 1e-6  # instants this near to each other are one [s]
+
 DECISION_DTYPE = _columns("time:f8 agent:i4 role:U8 target:U16 goal_x:f8 goal_y:f8")
 
 
@@ -98,6 +104,13 @@ class Record:
         `winner` -1 where a kind has none; `x`, `y` and `cost` are NaN there.
     complete : bool
         False when the run was cut short.
+    links : (n_aircraft, n_aircraft) int array
+        How many broadcasts of each aircraft (row) each other one (column) heard; (0, 0) when not
+        known.
+    condition : (n, n_aircraft, 8) float array
+        Not given: nominal throughout.
+    wind : (n, n_aircraft, 2) float array
+        Not given: calm.
     """
 
     scenario: Mapping[str, Any]
@@ -115,3 +128,52 @@ class Record:
     commands: NDArray[np.void]
     decisions: NDArray[np.void]
     complete: bool
+    links: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    condition: NDArray[np.float64] = field(
+        default_factory=lambda: np.zeros((0, 0, len(CONDITION_COLUMNS)))
+    )
+    wind: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 2)))
+
+    def __post_init__(self) -> None:
+        ticks, count = self.aircraft.shape[:2]
+        if self.condition.shape[:2] != (ticks, count):
+            object.__setattr__(self, "condition", np.tile(nominal(count), (ticks, 1, 1)))
+        if self.wind.shape[:2] != (ticks, count):
+            object.__setattr__(self, "wind", np.zeros((ticks, count, 2)))
+
+    def looks(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Where gimballed cameras were to look, by the command that was flown then.
+
+        Parameters
+        ----------
+        times : (m,) float array [s]
+
+        Returns
+        -------
+        (m, n_aircraft, 2) float array [m]
+            NaN before the first command and where a command leads to no point.
+        """
+        ends = np.full((len(self.times) + 1, self.aircraft.shape[1], 2), np.nan)
+        rows = self.commands[self.commands["agent"] < ends.shape[1]]
+        decided = np.searchsorted(self.times, rows["time"] - _SAME)
+        line = (rows["kind"] == "line")[:, None]
+        first = np.stack([rows["ax"], rows["ay"]], axis=1)
+        second = np.stack([rows["bx"], rows["by"]], axis=1)
+        # Row 0 stands for the time before any command; a decision rules what comes after it.
+        ends[decided + 1, rows["agent"]] = np.where(line, second, first)
+        looks: NDArray[np.float64] = ends[np.searchsorted(self.times, times - _SAME)]
+        return looks
+
+    @property
+    def risk(self) -> RiskConfig:
+        """Threats and no-fly regions of the run's scenario; none where it names none.
+
+        Raises
+        ------
+        RecordError
+            A risk section that no scenario can have.
+        """
+        try:
+            return RiskConfig.model_validate(self.scenario.get("risk", {}))
+        except ValidationError as error:
+            raise RecordError(f"scenario.risk: {error.errors()[0]['msg']}") from error

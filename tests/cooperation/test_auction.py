@@ -210,3 +210,36 @@ def test_every_target_gets_one_holder_in_spite_of_losses(agents, targets, loss, 
     assert all(
         isinstance(m, Heartbeat | Announce | Award | Bid | Revoke | Release) for m in bus.log
     )
+
+
+def test_copies_and_late_words_change_nothing():
+    """Twice, or after what the same agent said later: the newest word of each stands."""
+    pose, target = Pose(0.0, 0.0, 80.0, 0.0, 0.0, 15.0), TrackId(0.0, 1, 1)
+    side = Allocation(0, CooperationConfig(), turn_radius=RADIUS, step=1.0)
+    task = Task(target, (50.0, 0.0), 0.0, 50.0, True)
+
+    def beat(sequence, time, held):
+        place = None if held is None else (50.0, 0.0)
+        return Heartbeat(
+            1, sequence, time, pose=pose, role="pursue", goal=(0.0, 0.0), target=held,
+            target_position=place, cost=9.0,
+        )  # fmt: skip
+
+    def auctions(*inbox, time):
+        return [m for m in side.step(time, pose, [task], inbox) if isinstance(m, Announce)]
+
+    # Who holds the target lets go of it; its older claim comes late, and then once more.
+    assert not auctions(beat(1, 1.0, target), time=2.0)
+    release = Release(1, 4, 3.0, target=target, position=(50.0, 0.0), lost=False)
+    assert auctions(release, beat(3, 2.0, target), time=4.0)
+    # An award that was heard and served does not come again with its copy.
+    award = Award(1, 6, 4.0, target=target, position=(50.0, 0.0), winner=0, cost=50.0)
+    side.step(5.0, pose, [], [award])
+    assert side.holding is not None
+    side.give_up()
+    side.step(6.0, pose, [], [award])
+    assert side.holding is None
+    # A release that a later claim has overtaken does not end it.
+    assert not auctions(beat(9, 7.0, target), time=8.0)
+    late = Release(1, 8, 6.0, target=target, position=(50.0, 0.0), lost=False)
+    assert not auctions(late, time=9.0)

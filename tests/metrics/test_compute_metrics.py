@@ -311,7 +311,17 @@ def test_empty_runs():
     assert nothing["duration"] == 0.0
     assert nothing["targets"] == []
     assert nothing["aircraft"] == [
-        {"id": 0, "distance": 0.0, "exposure": 0.0, "min_separation": None, "building_strikes": 0}
+        {
+            "id": 0,
+            "distance": 0.0,
+            "exposure": 0.0,
+            "min_separation": None,
+            "building_strikes": 0,
+            "risk_exposure": 0.0,
+            "no_fly_seconds": 0.0,
+            "no_fly_violations": 0,
+            "heard_share": None,
+        }
     ]
     assert nothing["team"]["gospa_mean"] == 0.0
     assert nothing["team"]["visible_fraction"] is None

@@ -97,7 +97,7 @@ def test_key_lines_finds_every_written_key():
     for section, value in data.items():
         keys = [(section, key) for key in value] if isinstance(value, dict) else [(section,)]
         for path in keys:
-            assert lines[found[path] - 1].startswith(f"{path[-1]} ")
+            assert lines[found[path] - 1].startswith((f"{path[-1]} ", f"[{'.'.join(path)}]"))
 
 
 def test_key_lines_is_not_misled_by_texts_and_comments():

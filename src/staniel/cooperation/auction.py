@@ -36,6 +36,11 @@ from staniel.kernels.dubins import shortest_length
 
 __all__ = ["Allocation", "Holding", "Task"]
 
+_COPIES = 256
+"""Sequence numbers back from a sender's newest in which a copy is recognised; older is ignored."""
+
+_ALL_COPIES = (1 << _COPIES) - 1
+
 UNSOLD_PAUSE = 10.0
 """An auction without a bidder is not repeated for this long [s]."""
 
@@ -111,6 +116,9 @@ class Allocation:
         self._leases: dict[int, _Lease] = {}
         self._auctions: dict[TrackId, _Auction] = {}
         self._paused: dict[TrackId, float] = {}
+        # By sender: the newest number heard, and bit k for the one k before it.
+        self._heard: dict[int, tuple[int, int]] = {}
+        self._told: dict[int, int] = {}
         self._said_cost = math.inf
         self._sequence = 0
         self._tasks: dict[TrackId, Task] = {}
@@ -193,7 +201,20 @@ class Allocation:
 
     # -- hearing ---------------------------------------------------------------------------------
 
+    def _is_copy(self, message: Message) -> bool:
+        """Whether it was heard before, or is so old that nobody remembers."""
+        newest, heard = self._heard.get(message.sender, (message.sequence, 0))
+        age = newest - message.sequence
+        if age >= _COPIES or (age >= 0 and heard >> age & 1):
+            return True
+        if age < 0:
+            newest, heard, age = message.sequence, heard << min(-age, _COPIES), 0
+        self._heard[message.sender] = newest, (heard | 1 << age) & _ALL_COPIES
+        return False
+
     def _hear(self, message: Message) -> None:
+        if self._is_copy(message):
+            return
         match message:
             case Heartbeat():
                 self._hear_heartbeat(message)
@@ -207,12 +228,18 @@ class Allocation:
             case Revoke():
                 self._hear_revoke(message)
             case Release(target=target, sender=sender):
+                self._told[sender] = max(self._told.get(sender, 0), message.sequence)
                 lease = self._leases.get(sender)
-                if lease is not None and lease.target == target:
+                # A heartbeat that was said later may have come before it.
+                if lease is not None and lease.target == target and lease.said <= message.time:
                     del self._leases[sender]
 
     def _hear_heartbeat(self, message: Heartbeat) -> None:
         target, sender, position = message.target, message.sender, message.target_position
+        # What the sender said of itself since then, and was heard first, is the news.
+        if message.sequence < self._told.get(sender, 0):
+            return
+        self._told[sender] = message.sequence
         if target is None or position is None:
             lease = self._leases.get(sender)
             # Who says nothing of an award after it was made did not hear it.

@@ -10,6 +10,7 @@ from staniel.city import City
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Point
+from staniel.kernels.footprint import camera_axes
 from staniel.kernels.search import choose, mark
 
 __all__ = ["SearchMap"]
@@ -54,17 +55,23 @@ class SearchMap:
         """When each cell was last looked at, rows from the south [s]; NaN without a street."""
         return np.where(np.isnan(self._places[:, :, 0]), np.nan, self._looked)
 
-    def look(self, time: float, poses: Sequence[Pose]) -> None:
-        """Take note of what cameras at `poses` have a free view of, by the chart, at `time` [s]."""
+    def look(self, time: float, poses: Sequence[Pose], looks: Sequence[Point] = ()) -> None:
+        """Take note of what cameras at `poses` have a free view of, by the chart, at `time` [s].
+
+        `looks` are where gimbals look, one a pose [m]; not given, they look straight down.
+        """
         if time - self._looked_at < LOOK_EVERY:
             return
         self._looked_at = time
+        places = np.array(poses, dtype=np.float64)
+        points = np.array(looks or [(math.nan, math.nan)] * len(poses), dtype=np.float64)
         mark(
             self._chart.walls,
             self._looked,
             self._places,
             self._cell,
-            np.array(poses, dtype=np.float64),
+            places,
+            camera_axes(places, points, self._camera.mounting),
             self._camera.half_aperture,
             self._camera.range,
             time,

@@ -2,8 +2,10 @@
 
 from typing import Any
 
+from staniel.metrics.dangers import danger_metrics
 from staniel.metrics.flown import aircraft_metrics
 from staniel.metrics.following import follow
+from staniel.metrics.links import sender_metrics
 from staniel.metrics.targets import target_metrics
 from staniel.metrics.team import team_metrics
 from staniel.metrics.visible import visible_samples
@@ -38,7 +40,15 @@ def compute_metrics(record: Record) -> dict[str, Any]:
         "duration": float(record.times[-1]) if len(record.times) else 0.0,
         "complete": bool(record.complete),
         "targets": targets,
-        "aircraft": aircraft_metrics(record),
+        "aircraft": [
+            {**flown, **dangers, **heard}
+            for flown, dangers, heard in zip(
+                aircraft_metrics(record),
+                danger_metrics(record),
+                sender_metrics(record),
+                strict=True,
+            )
+        ],
         "team": team_metrics(record, following, targets),
     }
     rounded: dict[str, Any] = _rounded(metrics)

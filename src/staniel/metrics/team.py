@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.metrics.following import Following
+from staniel.metrics.links import link_matrix
 from staniel.record import Record
 
 __all__ = ["handovers", "team_metrics"]
@@ -30,6 +31,7 @@ def team_metrics(
     dict
     """
     messages = record.messages
+    on_air = messages[messages["receivers"] > 0]
     awards = messages[messages["kind"] == "award"]
     means = following.gospa.mean(axis=0).tolist() if len(following.gospa) else [None] * 4
     names = ("gospa_mean", "gospa_localisation", "gospa_missed", "gospa_false")
@@ -45,9 +47,11 @@ def team_metrics(
         "false_tracks": following.false_tracks,
         "auctions": len(set(awards[["target", "sender", "sequence"]].tolist())),
         "handovers": handovers(record.decisions),
-        "messages_sent": len(messages),
+        "messages_sent": len(on_air) if record.aircraft.shape[1] > 1 else len(messages),
         "messages_delivered": int(messages["heard"].sum()),
         "messages_possible": int(messages["receivers"].sum()),
+        "messages_dropped": len(messages) - len(on_air) if record.aircraft.shape[1] > 1 else None,
+        "links": link_matrix(record),
     }
 
 

@@ -1,17 +1,18 @@
 """When each vehicle is truly visible to the team, and the gaps in between."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
+from staniel.datatypes.equipment import Camera
+from staniel.datatypes.truth import CAMERA
 from staniel.kernels.visibility import seen_by
 from staniel.record import Record
 
-__all__ = ["gaps", "sample_step", "since", "visible_samples", "whole_seconds"]
+__all__ = ["condition_samples", "gaps", "sample_step", "since", "visible_samples", "whole_seconds"]
 
 Floats = NDArray[np.float64]
 
+_NOWHERE = -1e6  # height of a camera that sees nothing [m]
 _CLOSE = 1e-6  # instants this near to each other are one [s]
 
 
@@ -27,16 +28,39 @@ def visible_samples(record: Record) -> NDArray[np.bool_]:
     (m, n_vehicles) bool array
         At ``record.fine_times``.
     """
-    camera = record.scenario["camera"]
+    camera = Camera(**record.scenario["camera"])
+    poses = np.array(record.fine_aircraft, dtype=np.float64)
+    poses[~condition_samples(record, CAMERA), 2] = _NOWHERE
     counts = seen_by(
         record.city.walls,
-        np.ascontiguousarray(record.fine_aircraft, dtype=np.float64),
+        poses,
         np.ascontiguousarray(record.fine_vehicles, dtype=np.float64),
-        float(camera["target_height"]),
-        math.radians(camera["half_aperture_deg"]),
-        float(camera["range"]),
+        camera.target_height,
+        camera.half_aperture,
+        camera.range,
+        camera.mounting,
+        record.looks(record.fine_times),
     )
     return counts > 0
+
+
+def condition_samples(record: Record, column: int) -> NDArray[np.bool_]:
+    """Whether a condition of each aircraft holds, such as that it flies.
+
+    Parameters
+    ----------
+    record : Record
+    column : int
+        Of `Record.condition`; 1 where it holds.
+
+    Returns
+    -------
+    (m, n_aircraft) bool array
+        At ``record.fine_times``: what holds at the end of a tick holds throughout it.
+    """
+    ticks = np.searchsorted(record.times, record.fine_times - _CLOSE)
+    held = record.condition[:, :, column] > 0.0
+    return np.asarray(held[np.minimum(ticks, len(held) - 1)])
 
 
 def whole_seconds(times: Floats) -> NDArray[np.intp]:

@@ -8,9 +8,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
+from pydantic import ValidationError
 
-from staniel.city.footprint import footprint_polygon
+from staniel.city.coverage import footprint
 from staniel.datatypes.belief import Pose
+from staniel.datatypes.equipment import Camera
+from staniel.kernels.footprint import camera_axes
 from staniel.pictures import style
 from staniel.pictures.page import MAP_SIDE, SMOOTH, draw_clock, draw_page, draw_triangle
 from staniel.record import Record
@@ -105,10 +108,17 @@ class Canvas:
         return picture
 
     def _draw_footprints(self, draw: ImageDraw.ImageDraw, tick: int) -> None:
-        if self._camera is None:
+        camera = self._camera
+        if camera is None:
             return
-        for identity, pose in enumerate(self._record.aircraft[tick].tolist()):
-            corners = footprint_polygon(Pose(*pose), *self._camera)
+        poses = np.ascontiguousarray(self._record.aircraft[tick])
+        looks = self._record.looks(self._record.times[tick : tick + 1])[0]
+        axes = camera_axes(poses, looks, camera.mounting)
+        for identity, (pose, axis) in enumerate(zip(poses.tolist(), axes, strict=True)):
+            if np.isnan(axis[0]):
+                continue
+            seen = footprint(Pose(*pose), camera.half_aperture, camera.range, axis=axis)
+            corners = seen.polygon
             if len(corners) >= 3:
                 color = style.of_aircraft(identity)
                 points = self._pixels(corners)
@@ -168,15 +178,15 @@ class Canvas:
             draw_triangle(draw, place, float(poses[identity, 3]), style.of_aircraft(identity))
 
 
-def _camera(scenario: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Half-aperture [rad] and range [m]; None where the scenario does not say them."""
+def _camera(scenario: Mapping[str, Any]) -> Camera | None:
+    """The camera; None where the scenario does not say its cone and range."""
     camera = scenario.get("camera")
-    if not isinstance(camera, Mapping):
+    if not isinstance(camera, Mapping) or not {"half_aperture_deg", "range"} <= camera.keys():
         return None
-    aperture, range_ = camera.get("half_aperture_deg"), camera.get("range")
-    if not isinstance(aperture, int | float) or not isinstance(range_, int | float):
+    try:
+        return Camera.model_validate(camera)
+    except ValidationError:
         return None
-    return (math.radians(aperture), float(range_)) if 0.0 < aperture < 90.0 else None
 
 
 def _paths(record: Record) -> tuple[Floats, Floats, Floats]:

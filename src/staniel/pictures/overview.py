@@ -45,6 +45,7 @@ def draw_overview(record: Record, path: str | os.PathLike[str]) -> None:
     """
     figure, axes = _page(record)
     _draw_city(axes, record)
+    _draw_risk(axes, record)
     weight = float(np.interp(max(record.city.size), (400.0, 3000.0), (0.8, 1.1)))
     _draw_flown(axes, record, weight)
     _draw_detections(axes, record)
@@ -119,6 +120,26 @@ def _draw_city(axes: "Axes", record: Record) -> None:
         collection.set_edgecolor(_rgb(style.EDGE))
         collection.set_array(np.asarray(record.city.heights))
         axes.add_collection(collection, autolim=False)
+
+
+def _draw_risk(axes: "Axes", record: Record) -> None:
+    from matplotlib.patches import Circle, Patch, Polygon
+
+    for region in record.risk.regions:
+        look = _risk_look(region.kind)
+        shape: Patch
+        if region.polygon is not None:
+            shape = Polygon(region.polygon, closed=True, zorder=2, **look)
+        else:
+            shape = Circle(region.center or (0.0, 0.0), region.radius or 0.0, zorder=2, **look)
+        axes.add_patch(shape)
+
+
+def _risk_look(kind: str) -> dict[str, Any]:
+    color = style.NO_FLY if kind == "no-fly" else style.THREAT
+    hatch = "///" if kind == "no-fly" else None
+    edge = _rgb(color, 0.7)
+    return {"facecolor": _rgb(color, 0.13), "edgecolor": edge, "hatch": hatch, "linewidth": 1.0}
 
 
 def _draw_flown(axes: "Axes", record: Record, weight: float) -> None:
@@ -209,6 +230,7 @@ def _draw_legend(figure: "Figure", axes: "Axes", record: Record) -> None:
 
 def _handles(record: Record) -> Sequence[Any]:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
     def handle(label: str, color: style.Rgb, **look: Any) -> Line2D:  # noqa: ANN401
         return Line2D([], [], label=label, color=_rgb(color), **look)
@@ -229,4 +251,9 @@ def _handles(record: Record) -> Sequence[Any]:
         handle("detection", ink, marker="o", ms=2.2, ls="none"),
         handle("award, in the winner's colour", ink, marker="*", ms=10, mec="white", ls="none"),
         handle("start", ink, marker=(3, 0, 0), ms=7, mfc="none", ls="none"),
+        *(
+            Patch(label=kind, **_risk_look(kind))
+            for kind in ("threat", "no-fly")
+            if any(region.kind == kind for region in record.risk.regions)
+        ),
     ]

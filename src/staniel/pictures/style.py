@@ -12,10 +12,12 @@ __all__ = [
     "EDGE",
     "GROUND",
     "INK",
+    "NO_FLY",
     "PAPER",
     "ROOF_HIGH",
     "ROOF_LOW",
     "TEAM",
+    "THREAT",
     "TRACK",
     "VEHICLE",
     "Rgb",
@@ -42,6 +44,8 @@ TEAM: Final[tuple[Rgb, ...]] = (
 VEHICLE: Final[Rgb] = (24, 24, 27)
 TRACK: Final[Rgb] = (220, 20, 60)
 INK: Final[Rgb] = (40, 40, 44)
+NO_FLY: Final[Rgb] = (200, 30, 30)
+THREAT: Final[Rgb] = (240, 130, 20)
 PAPER: Final[Rgb] = (255, 255, 255)
 GROUND: Final[Rgb] = (250, 249, 245)
 EDGE: Final[Rgb] = (140, 140, 146)

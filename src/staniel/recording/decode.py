@@ -4,13 +4,19 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any, Final, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
-from staniel.datatypes.truth import AIRCRAFT_COLUMNS, VEHICLE_COLUMNS
+from staniel.datatypes.truth import (
+    AIRCRAFT_COLUMNS,
+    CONDITION_COLUMNS,
+    VEHICLE_COLUMNS,
+    nominal,
+)
 from staniel.errors import CityError, RecordError
 from staniel.record import (
     COMMAND_DTYPE,
@@ -69,17 +75,22 @@ def decode(contents: Contents) -> Record:
     city = _city(contents)
     ticks = _whole_ticks(contents.ticks)
     truth = [entry for _, entry in _entries(ticks, "truth")]
+    poses, links = _poses(truth), _Links()
+    condition, wind = _conditions(ticks, poses["aircraft"].shape[1])
     return Record(
         scenario=scenario,
         version=version,
         city=city,
-        **_poses(truth),
+        **poses,
         sightings=_table(ticks, "sightings", SIGHTING_DTYPE, _sighting),
         tracks=_table(ticks, "tracks", TRACK_DTYPE, _track),
-        messages=_table(ticks, "messages", MESSAGE_DTYPE, _message, ("cost", "x", "y")),
+        messages=_table(ticks, "messages", MESSAGE_DTYPE, links.row, ("cost", "x", "y")),
         commands=_table(ticks, "commands", COMMAND_DTYPE, _command, _PATH_COLUMNS),
         decisions=_table(ticks, "decisions", DECISION_DTYPE, _decision),
         complete=contents.complete,
+        links=links.counted(poses["aircraft"].shape[1]),
+        condition=condition,
+        wind=wind,
     )
 
 
@@ -130,7 +141,7 @@ def _whole_ticks(ticks: Mapping[int, Mapping[str, bytes]]) -> dict[int, Mapping[
     """The ticks from the first on that have all their messages, up to the first gap."""
     whole: dict[int, Mapping[str, bytes]] = {}
     first = min(ticks, default=0)
-    while len(ticks.get(first + len(whole), ())) == len(TICK_TOPICS):
+    while ticks.get(first + len(whole), {}).keys() >= set(TICK_TOPICS):
         whole[first + len(whole)] = ticks[first + len(whole)]
     if not whole:
         raise RecordError("holds no whole tick: the run was cut off before its first one ended")
@@ -172,6 +183,26 @@ def _poses(truth: Sequence[Mapping[str, Any]]) -> dict[str, Floats]:
         if np.any(np.diff(poses[name]) <= 0.0):
             raise RecordError(f"{where}: {name} do not increase")
     return poses
+
+
+def _conditions(ticks: Mapping[int, Mapping[str, bytes]], count: int) -> tuple[Floats, Floats]:
+    """Conditions (n, count, 8) and winds (n, count, 2); a tick without a message is nominal."""
+    where = "/staniel/condition"
+    columns = (*CONDITION_COLUMNS, "wind_x", "wind_y")
+    plain = np.hstack([nominal(count), np.zeros((count, 2))])
+    rows = np.tile(plain, (len(ticks), 1, 1))
+    try:
+        for k, (tick, texts) in enumerate(ticks.items()):
+            if where in texts:
+                found = _json(texts[where], f"{where}, tick {tick}")["aircraft"]
+                values = [[item[column] for column in columns] for item in found]
+                rows[k] = _floats(values, plain.shape)
+    except RecordError:
+        raise
+    except _MALFORMED as error:
+        raise _malformed(where, error) from error
+    width = len(CONDITION_COLUMNS)
+    return np.ascontiguousarray(rows[:, :, :width]), np.ascontiguousarray(rows[:, :, width:])
 
 
 def _floats(values: Sequence[Any], shape: tuple[int, ...]) -> Floats:
@@ -254,6 +285,31 @@ def _message(_: float, item: Mapping[str, Any]) -> Row:
         _text(item["target"], 16), -1 if winner is None else winner, _or_nan(item["cost"]),
         _or_nan(item["x"]), _or_nan(item["y"]), item["receivers"], len(item["heard_by"]),
     )  # fmt: skip
+
+
+class _Links:
+    """Who heard whom: gathered row by row, counted at the end."""
+
+    def __init__(self) -> None:
+        self._senders: list[int] = []
+        self._heard_by: list[Sequence[int]] = []
+
+    def row(self, time: float, item: Mapping[str, Any]) -> Row:
+        self._senders.append(item["sender"])
+        self._heard_by.append(item["heard_by"])
+        return _message(time, item)
+
+    def counted(self, count: int) -> NDArray[np.int64]:
+        """(count, count) broadcasts of each aircraft (row) that each one (column) heard."""
+        try:
+            lengths = [len(heard) for heard in self._heard_by]
+            senders = np.repeat(np.array(self._senders, dtype=np.int64), lengths)
+            receivers = np.fromiter(chain.from_iterable(self._heard_by), np.int64, sum(lengths))
+        except _MALFORMED as error:
+            raise _malformed("/staniel/messages", error) from error
+        known = (senders >= 0) & (senders < count) & (receivers >= 0) & (receivers < count)
+        links = senders[known] * count + receivers[known]
+        return np.bincount(links, minlength=count * count).reshape(count, count).astype(np.int64)
 
 
 _PATH_COLUMNS: Final = ("ax", "ay", "bx", "by", "radius")

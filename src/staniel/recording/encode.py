@@ -25,7 +25,7 @@ from staniel.datatypes.message import (
     Release,
     Revoke,
 )
-from staniel.datatypes.truth import Truth
+from staniel.datatypes.truth import NOMINAL, Truth
 from staniel.record import Frame
 
 __all__ = ["FINE_STEP", "FineSteps", "encode_tick"]
@@ -36,6 +36,10 @@ FINE_STEP: Final = 0.2
 _AIRCRAFT_ROW = "[%.3f,%.3f,%.3f,%.4f,%.4f,%.3f]"
 _VEHICLE_ROW = "[%.3f,%.3f,%.4f,%.3f]"
 _AIRCRAFT = '{"id":%d,"x":%%.3f,"y":%%.3f,"z":%%.3f,"heading":%%.4f,"bank":%%.4f,"speed":%%.3f}'
+_CONDITION = (
+    '{"id":%d,"energy":%.6f,"camera":%s,"radio":%s,"flying":%s,"lost":%s,'
+    '"drift_x":%.3f,"drift_y":%.3f,"climb":%.3f,"wind_x":%.3f,"wind_y":%.3f}'
+)
 _VEHICLE = '{"id":%d,"x":%%.3f,"y":%%.3f,"heading":%%.4f,"speed":%%.3f}'
 _SIGHTING = (
     '{"time":%s,"reporter":%d,"x":%.3f,"y":%.3f,"cxx":%.6g,"cxy":%.6g,"cyy":%.6g,"origin":%d}'
@@ -56,6 +60,7 @@ _ORBIT = (
     '"altitude":%.3f}'
 )
 _BANKS = '{"agent":%d,"kind":"banks","banks":[%s],"hold":%s,"speed":%.3f,"altitude":%.3f}'
+_NOMINAL = np.array(NOMINAL)
 _DECISION = '{"agent":%d,"role":"%s","target":%s,"goal":[%.3f,%.3f]}'
 
 
@@ -86,7 +91,8 @@ def encode_tick(frame: Frame, fine: FineSteps) -> list[tuple[str, str]]:
     Returns
     -------
     list of (str, str)
-        Topic and JSON text, one for each of `schemas.TICK_TOPICS`.
+        Topic and JSON text, one for each of `schemas.TICK_TOPICS`, and the condition of the
+        aircraft where that is not nominal or the wind blows.
     """
     head = f'{{"tick":{frame.truth.tick},"time":{_time(frame.truth.time)},'
     rows = {
@@ -101,6 +107,9 @@ def encode_tick(frame: Frame, fine: FineSteps) -> list[tuple[str, str]]:
         (f"/staniel/{kind}", f'{head}"{kind}":[{",".join(items)}]}}')
         for kind, items in rows.items()
     ]
+    if frame.truth.wind.any() or (frame.truth.condition != _NOMINAL).any():
+        conditions = ",".join(_conditions(frame.truth))
+        texts.append(("/staniel/condition", f'{head}"aircraft":[{conditions}]}}'))
     return texts
 
 
@@ -119,6 +128,15 @@ def _truth(truth: Truth, fine: FineSteps) -> str:
         f'"aircraft":{aircraft},"vehicles":{vehicles},"fine":{{"times":[{times}],'
         f'"aircraft":{fine_aircraft},"vehicles":{fine_vehicles}}}'
     )
+
+
+def _conditions(truth: Truth) -> list[str]:
+    rows = []
+    for agent, row in enumerate(np.hstack([truth.condition, truth.wind]).tolist()):
+        energy, *flags, drift_x, drift_y, climb, wind_x, wind_y = row
+        words = ["true" if flag else "false" for flag in flags]
+        rows.append(_CONDITION % (agent, energy, *words, drift_x, drift_y, climb, wind_x, wind_y))
+    return rows
 
 
 def _fill(template: str, values: NDArray[np.float64]) -> str:

@@ -9,7 +9,13 @@ from typing import Final
 from staniel.errors import RecordError
 from staniel.record import Record
 from staniel.recording.decode import Contents, decode
-from staniel.recording.schemas import FILE_NAME, ONCE_TOPICS, RUN_METADATA, TICK_TOPICS
+from staniel.recording.schemas import (
+    FILE_NAME,
+    ONCE_TOPICS,
+    OPTIONAL_TOPICS,
+    RUN_METADATA,
+    TICK_TOPICS,
+)
 
 __all__ = ["read_record"]
 
@@ -116,7 +122,7 @@ def _scan_record(data: bytes, opcode: int, start: int, end: int, contents: Conte
         channel, tick, _, _ = _MESSAGE_HEAD.unpack_from(data, start)
         topic = contents.channels.get(channel, "")
         body = data[start + _MESSAGE_HEAD.size : end]
-        if topic in TICK_TOPICS:
+        if topic in TICK_TOPICS or topic in OPTIONAL_TOPICS:
             contents.ticks.setdefault(tick, {})[topic] = body
         elif topic in ONCE_TOPICS:
             contents.once[topic] = body

@@ -7,6 +7,7 @@ __all__ = [
     "FILE_NAME",
     "FORMAT",
     "ONCE_TOPICS",
+    "OPTIONAL_TOPICS",
     "RUN_METADATA",
     "SCHEMAS",
     "TICK_TOPICS",
@@ -43,6 +44,10 @@ def _integer(description: str) -> Schema:
     return {"type": "integer", "description": description}
 
 
+def _boolean(description: str) -> Schema:
+    return {"type": "boolean", "description": description}
+
+
 def _string(description: str) -> Schema:
     return {"type": "string", "description": description}
 
@@ -69,6 +74,19 @@ _AIRCRAFT = _object(
     heading=_COURSE["heading"],
     bank=_number("left positive [rad]"),
     speed=_number("airspeed [m/s]"),
+)
+_CONDITION = _object(
+    id=_integer("of the aircraft"),
+    energy=_number("share left"),
+    camera=_boolean("it delivers"),
+    radio=_boolean("it sends and hears"),
+    flying=_boolean("launched and not lost"),
+    lost=_boolean("for good"),
+    drift_x=_number("how far its navigation is off to the east [m]"),
+    drift_y=_number("to the north [m]"),
+    climb=_number("rate [m/s]"),
+    wind_x=_number("velocity of the air around it to the east [m/s]"),
+    wind_y=_number("to the north [m/s]"),
 )
 _VEHICLE = _object(id=_integer("of the vehicle"), x=_X, y=_Y, **_COURSE)
 _FINE = _object(
@@ -129,7 +147,7 @@ _COMMAND["properties"] |= {
 }
 _DECISION = _object(
     agent=_integer("aircraft"),
-    role=_string("search, pursue or recover"),
+    role=_string("search, pursue, recover, or down on the ground"),
     target=_or_null(_string("track it is responsible for, founder-serial")),
     goal=_POINT,
 )
@@ -206,6 +224,10 @@ SCHEMAS: Final[dict[str, tuple[str, Schema]]] = {
         "staniel.Decisions",
         _tick("staniel.Decisions", decisions=_list(_DECISION)),
     ),
+    "/staniel/condition": (
+        "staniel.Condition",
+        _tick("staniel.Condition", aircraft=_list(_CONDITION)),
+    ),
     "/scene/city": ("foxglove.SceneUpdate", _SCENE),
     "/scene/team": ("foxglove.SceneUpdate", _SCENE),
 }
@@ -219,6 +241,9 @@ TICK_TOPICS: Final = tuple(
     for kind in ("truth", "sightings", "tracks", "messages", "commands", "decisions")
 )
 """The topics that every tick has one message on."""
+
+OPTIONAL_TOPICS: Final = ("/staniel/condition",)
+"""The topics that have a message in the ticks that need one."""
 
 
 def schema_bytes(schema: Schema) -> bytes:

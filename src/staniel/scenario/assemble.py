@@ -6,11 +6,12 @@ import numpy as np
 
 from staniel.agent import Agent, Briefing
 from staniel.city import City
+from staniel.errors import ScenarioError
 from staniel.mission import Mission
 from staniel.scenario.model import Scenario
-from staniel.world import Cameras, Radio, World
+from staniel.world import Cameras, Lidars, Radio, World
 
-__all__ = ["assemble"]
+__all__ = ["assemble", "kernels_of"]
 
 
 def assemble(scenario: Scenario, city: City) -> Mission:
@@ -33,10 +34,16 @@ def assemble(scenario: Scenario, city: City) -> Mission:
     Raises
     ------
     ScenarioError
-        An aircraft or a vehicle has no place in this city.
+        An aircraft or a vehicle has no place in this city, or sightings would come too late.
     """
-    world_seed, camera_seed, radio_seed, agent_seed = np.random.SeedSequence(scenario.seed).spawn(4)
+    seeds = np.random.SeedSequence(scenario.seed).spawn(5)
+    world_seed, camera_seed, radio_seed, agent_seed, lidar_seed = seeds
     team, clock = scenario.aircraft, scenario.clock
+    if scenario.camera.delay > scenario.tracking.late_limit:
+        raise ScenarioError(
+            f"camera.delay = {scenario.camera.delay:g} s: expected at most "
+            f"tracking.late_limit = {scenario.tracking.late_limit:g} s, or no sighting is used"
+        )
     chart = City.open(city.size) if scenario.chart == "blank" else replace(city)
     briefing = Briefing(
         chart=chart,
@@ -46,16 +53,50 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         tracking=scenario.tracking,
         cooperation=scenario.cooperation,
         guidance=scenario.guidance,
+        risk=scenario.risk.briefed,
     )
-    world = World(city, team, team.count, scenario.vehicles, clock, world_seed)
+    airframes = scenario.airframes
+    world = World(
+        city,
+        team,
+        team.count,
+        scenario.vehicles,
+        clock,
+        world_seed,
+        wind=scenario.wind,
+        faults=scenario.faults,
+        launch=scenario.launch,
+        airframes=airframes,
+    )
+    lidar = scenario.lidar
     return Mission(
         world=world,
-        cameras=Cameras(city, scenario.camera, team.altitude, camera_seed),
-        radio=Radio(scenario.radio, radio_seed.generate_state(1, np.uint64)[0]),
+        cameras=Cameras(city, scenario.camera, team.altitude, camera_seed, clock),
+        radio=Radio(
+            scenario.radio,
+            radio_seed.generate_state(1, np.uint64)[0],
+            city,
+            clock.decision_step,
+        ),
         agents=[
-            Agent(number, briefing, np.random.default_rng(seed))
+            Agent(
+                number, replace(briefing, airframe=airframes[number]), np.random.default_rng(seed)
+            )
             for number, seed in enumerate(agent_seed.spawn(team.count))
         ],
         start=world.start(),
         ticks=round(scenario.minutes * 60.0 / clock.decision_step),
+        lidars=None if lidar.mount == "none" else Lidars(city, lidar, lidar_seed),
     )
+
+
+def kernels_of(scenario: Scenario) -> list[str]:
+    """Kernel modules that this scenario calls beside those that every mission does."""
+    uses = {
+        "gusts": scenario.wind.gusts,
+        "lidar": scenario.lidar.mount != "none",
+        "risk": scenario.risk.regions or scenario.risk.carried.radius,
+        "roads": scenario.vehicles.kind == "roads",
+        "replay": scenario.vehicles.kind == "replay",
+    }
+    return [name for name, used in uses.items() if used]

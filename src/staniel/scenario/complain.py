@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -12,7 +12,7 @@ from staniel.scenario.write import format_value
 
 __all__ = ["complaints", "nearest"]
 
-Path = tuple[str, ...]
+Path = tuple[str | int, ...]
 
 _EXPECTED = {
     "bool_type": "true or false",
@@ -65,11 +65,10 @@ def nearest(word: str, known: list[str]) -> str:
 
 def _complaint(found: ErrorDetails, where: Callable[[Path], str]) -> str:
     location, kind = found["loc"], found["type"]
-    path = tuple(part for part in location if isinstance(part, str))
-    name = "".join(f".{part}" if isinstance(part, str) else f"[{part}]" for part in location)[1:]
+    path, name = tuple(location), _name(location)
     if kind == "extra_forbidden":
         known = sorted(_keys(path[:-1]))
-        return f"{where(path)}{name}: unknown key, {nearest(path[-1], known)}"
+        return f"{where(path)}{name}: unknown key, {nearest(str(path[-1]), known)}"
     if kind == "missing":
         return f"{where(path)}{name}: missing, expected a value"
     if kind == "value_error" and isinstance(found["input"], Mapping | BaseModel):
@@ -83,8 +82,8 @@ def _about_section(path: Path, message: str, where: Callable[[Path], str]) -> st
     """A finding on several keys at once; by custom its message starts with the key at fault."""
     key = message.split(" ", 1)[0]
     if key in _keys(path):
-        return f"{where((*path, key))}{'.'.join((*path, message))}"
-    return f"{where(path)}{'.'.join(path)}: {message}" if path else f"{where(path)}{message}"
+        return f"{where((*path, key))}{_name((*path, message))}"
+    return f"{where(path)}{_name(path)}: {message}" if path else f"{where(path)}{message}"
 
 
 def _expectation(found: ErrorDetails, path: Path) -> str:
@@ -94,8 +93,13 @@ def _expectation(found: ErrorDetails, path: Path) -> str:
     if words is None:
         return found["msg"]
     context = {key: _short(value) for key, value in found.get("ctx", {}).items()}
-    meaning = _keys(path[:-1]).get(path[-1], "")
+    meaning = _keys(path[:-1]).get(str(path[-1]), "")
     return f"expected {words.format(**context)}" + (f" ({meaning})" if meaning else "")
+
+
+def _name(location: Path) -> str:
+    """A place as it is written: names joined by dots, numbers in brackets."""
+    return "".join(f".{part}" if isinstance(part, str) else f"[{part}]" for part in location)[1:]
 
 
 def _short(value: Any) -> str:  # noqa: ANN401 - a bound of any type
@@ -106,10 +110,13 @@ def _keys(path: Path) -> dict[str, str]:
     """Keys of the section at a path with their meanings, empty where there is no such section."""
     model: type[BaseModel] = Scenario
     for part in path:
+        if isinstance(part, int):
+            continue
         field = model.model_fields.get(part)
-        if field is None or not (
-            isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel)
-        ):
+        kind: Any = None if field is None else field.annotation
+        if get_origin(kind) is tuple:  # a list of tables
+            kind = get_args(kind)[0]
+        if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
             return {}
-        model = field.annotation
+        model = kind
     return {key: field.description or "" for key, field in model.model_fields.items()}

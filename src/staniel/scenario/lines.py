@@ -18,7 +18,7 @@ _TOKEN = re.compile(
 )
 _NAME = re.compile(r"""[A-Za-z0-9_"'-]""")
 
-Path = tuple[str, ...]
+Path = tuple[str | int, ...]
 
 
 def key_lines(text: str) -> dict[Path, int]:
@@ -31,30 +31,36 @@ def key_lines(text: str) -> dict[Path, int]:
 
     Returns
     -------
-    dict of tuple of str to int
-        From the path of a key to its line, counted from 1. Keys in inline tables are left out.
+    dict of tuple of str and int to int
+        From the path of a key to its line, counted from 1. Tables of a list have their number in
+        the path, counted from 0. Keys in inline tables are left out.
 
     Examples
     --------
     >>> key_lines("seed = 3\n[city]\nsize = [\n 1, 2]\n")
     {('seed',): 1, ('city',): 2, ('city', 'size'): 3}
+    >>> key_lines("[[part]]\nlength = 1\n[[part]]\nlength = 2")[("part", 1, "length")]
+    4
     """
     lines: dict[Path, int] = {}
     table: Path = ()
     path: list[str] = []
+    counts: dict[Path, int] = {}
     header = in_value = False
-    depth, number = 0, 1
+    depth, number, brackets = 0, 1, 0
     for match in _TOKEN.finditer(text + "\n"):
         token = match[0]
         if token == "\n" and depth == 0:
             if header:
-                table = tuple(path)
+                table = _numbered(path, counts, brackets == 2)
+                lines.setdefault(tuple(path), number)
                 lines.setdefault(table, number)
-            path, header, in_value = [], False, False
+            path, header, in_value, brackets = [], False, False, 0
         elif in_value:
             depth += (token in "[{") - (token in "]}")
         elif token == "[":
             header = True
+            brackets += 1
         elif token == "=":
             in_value = True
             lines.setdefault((*table, *path), number)
@@ -71,6 +77,19 @@ def find_line(lines: dict[Path, int], path: Path) -> int | None:
         if line is not None:
             return line
     return None
+
+
+def _numbered(names: list[str], counts: dict[Path, int], is_list: bool) -> Path:
+    """Path of a table header, with the numbers of the lists of tables that it lies in."""
+    path: list[str | int] = []
+    for place, name in enumerate(names):
+        path.append(name)
+        here = tuple(path)
+        if is_list and place == len(names) - 1:
+            counts[here] = counts.get(here, 0) + 1
+        if here in counts:
+            path.append(counts[here] - 1)
+    return tuple(path)
 
 
 def _unquote(token: str) -> str:

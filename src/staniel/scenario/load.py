@@ -109,10 +109,10 @@ class _Origin:
     """Where each value came from, for messages."""
 
     label: str
-    lines: dict[tuple[str, ...], int]
+    lines: dict[tuple[str | int, ...], int]
     changed: set[tuple[str, ...]] = field(default_factory=set)
 
-    def where(self, path: tuple[str, ...]) -> str:
+    def where(self, path: tuple[str | int, ...]) -> str:
         if any(path[: len(change)] == change for change in self.changed):
             return ""
         line = find_line(self.lines, path)
@@ -193,20 +193,23 @@ def _merge(base: dict[str, Any], changes: Mapping[str, Any]) -> None:
 
 
 def _drop_old_source(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Another kind of city takes the place of the old one: keep only what it also has."""
+    """Another city takes the place of the old one: keep only what it also has, and no old roads."""
     old, new = data.get("city"), changes.get("city")
     if isinstance(old, dict) and isinstance(new, dict):
         own = CITY_KEYS.get(str(new.get("source")))
         if own is not None:
             for key in [key for key in old if key not in ("source", *own)]:
                 del old[key]
+        if "file" in new:
+            old.pop("roads", None)
 
 
 def _anchor(data: dict[str, Any], folder: Path) -> None:
-    """Make the name of the city's file absolute."""
-    city = data.get("city")
-    if isinstance(city, dict) and isinstance(city.get("file"), str) and city["file"]:
-        city["file"] = str(folder / city["file"])
+    """Make the names of files absolute."""
+    for name, key in (("city", "file"), ("city", "roads"), ("vehicles", "replay")):
+        section = data.get(name)
+        if isinstance(section, dict) and isinstance(section.get(key), str) and section[key]:
+            section[key] = str(folder / section[key])
 
 
 def _leaves(changes: Mapping[str, Any]) -> set[tuple[str, ...]]:

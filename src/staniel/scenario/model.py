@@ -6,6 +6,7 @@ from pydantic import (
     AfterValidator,
     Field,
     SerializerFunctionWrapHandler,
+    ValidationError,
     model_serializer,
     model_validator,
 )
@@ -13,12 +14,13 @@ from pydantic import (
 from staniel.cooperation.config import CooperationConfig
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.config import Config
-from staniel.datatypes.equipment import Airframe, Camera, RadioSet
+from staniel.datatypes.equipment import Airframe, Camera, Lidar, RadioSet
+from staniel.datatypes.risk import RiskConfig
 from staniel.guidance.config import GuidanceConfig
 from staniel.tracking.config import TrackingConfig
-from staniel.world.config import Traffic
+from staniel.world.config import Faults, Launch, Traffic, Wind
 
-__all__ = ["CITY_KEYS", "Aircraft", "CitySource", "Scenario"]
+__all__ = ["CITY_KEYS", "Aircraft", "CitySource", "Group", "Scenario"]
 
 Metres = Annotated[float, Field(gt=0.0, le=1e5)]
 
@@ -35,19 +37,25 @@ CITY_KEYS = {
     "generate": ("size", "density", "block", "heights", "seed"),
     "image": ("file", "cell", "heights", "seed"),
     "grid": ("file", "cell", "heights", "seed"),
+    "open": ("size",),
+    "geojson": ("file", "frame", "roads", "heights", "seed"),
 }
 """Which keys of the city belong to which source; every other one is refused there."""
 
 
 class CitySource(Config):
-    """Where the map comes from: generated, or read from an image or a Moving AI grid."""
+    """Where the map comes from: generated, or read from a file, or open ground."""
 
-    source: Literal["generate", "image", "grid"] = Field("generate", description="kind of map")
+    source: Literal["generate", "image", "grid", "geojson", "open"] = Field(
+        "generate", description="kind of map"
+    )
     size: tuple[Metres, Metres] = Field((600.0, 600.0), description="east, north [m]")
     density: float = Field(0.42, gt=0.0, le=0.8, description="built share of the ground")
     block: Range = Field((40.0, 60.0), description="shortest, longest side of a block [m]")
-    file: str | None = Field(None, min_length=1, description="image, or Moving AI .map")
+    file: str | None = Field(None, min_length=1, description="image, Moving AI .map, or GeoJSON")
     cell: Metres | None = Field(None, description="metres per pixel or grid cell")
+    frame: Literal["auto", "wgs84", "metres"] = Field("auto", description="of the coordinates")
+    roads: str | None = Field(None, min_length=1, description="GeoJSON with roads; optional")
     heights: Range = Field((10.0, 40.0), description="lowest and highest roof [m]")
     seed: int | None = Field(None, ge=0, description="of the city; not set: the scenario's seed")
 
@@ -63,7 +71,7 @@ class CitySource(Config):
                 )
         if self.source != "generate":
             for key, meaning in (("file", "a file name"), ("cell", "metres per cell (--cell)")):
-                if getattr(self, key) is None:
+                if key in own and getattr(self, key) is None:
                     raise ValueError(f'{key} is missing: source = "{self.source}" needs {meaning}')
         return self
 
@@ -74,9 +82,18 @@ class CitySource(Config):
 
 
 class Aircraft(Airframe):
-    """The team: how many aircraft, all of one kind."""
+    """The team: how many aircraft, and what they are where no group says otherwise."""
 
     count: int = Field(4, ge=1, le=500, description="aircraft in the team")
+
+
+class Group(Config):
+    """Aircraft of one kind in a team of several kinds."""
+
+    count: int = Field(ge=1, le=500, description="aircraft of this kind")
+    aircraft: dict[str, float] = Field(
+        {}, max_length=50, description="what differs from the section aircraft, by its keys"
+    )
 
 
 class Scenario(Config):
@@ -93,12 +110,21 @@ class Scenario(Config):
     minutes: float = Field(10.0, gt=0.0, le=1440.0, description="mission time [min]")
     chart: Literal["known", "blank"] = Field("known", description="do agents hold the city's map")
 
+    groups: tuple[Group, ...] = Field(
+        (), max_length=500, description="kinds of aircraft, in turn; empty: all of one kind"
+    )
+
     clock: Clock = Clock()
     city: CitySource = CitySource()
     vehicles: Traffic = Traffic()
     aircraft: Aircraft = Aircraft()
+    launch: Launch = Launch()
+    faults: Faults = Faults()
+    wind: Wind = Wind()
     camera: Camera = Camera()
+    lidar: Lidar = Lidar()
     radio: RadioSet = RadioSet()
+    risk: RiskConfig = RiskConfig()
     tracking: TrackingConfig = TrackingConfig()
     cooperation: CooperationConfig = CooperationConfig()
     guidance: GuidanceConfig = GuidanceConfig()
@@ -111,3 +137,60 @@ class Scenario(Config):
                 f"clock.decision_step = {self.clock.decision_step:g} s"
             )
         return self
+
+    @model_validator(mode="after")
+    def _who_is_named_is_there(self) -> Self:
+        named = (
+            (f"radio.partitions[{k}].groups", member, self.aircraft.count, "aircraft")
+            for k, partition in enumerate(self.radio.partitions)
+            for group in partition.groups
+            for member in group
+        )
+        failing = (
+            (f"faults.schedule[{k}]", fault.aircraft, self.aircraft.count, "aircraft")
+            for k, fault in enumerate(self.faults.schedule)
+        )
+        carriers = self.risk.carried.vehicles or ()
+        carrying = (
+            ("risk.carried.vehicles", carrier, self.vehicles.count, "vehicle")
+            for carrier in carriers
+        )
+        for key, number, count, what in (*named, *failing, *carrying):
+            if number >= count:
+                raise ValueError(
+                    f"{key} names {what} {number}, but there are {count}: expected numbers below"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _groups_make_the_team(self) -> Self:
+        if self.groups:
+            together = sum(group.count for group in self.groups)
+            if together != self.aircraft.count:
+                raise ValueError(
+                    f"groups have {together} aircraft together, but aircraft.count = "
+                    f"{self.aircraft.count}: expected the same"
+                )
+            for number, group in enumerate(self.groups):
+                self._airframe(number, group)
+        return self
+
+    @property
+    def airframes(self) -> tuple[Airframe, ...]:
+        """What each aircraft of the team is, in the order of the team."""
+        if not self.groups:
+            return (self.aircraft,) * self.aircraft.count
+        return tuple(
+            airframe
+            for number, group in enumerate(self.groups)
+            for airframe in (self._airframe(number, group),) * group.count
+        )
+
+    def _airframe(self, number: int, group: Group) -> Airframe:
+        common = self.aircraft.model_dump(exclude={"count"})
+        try:
+            return Airframe(**(common | group.aircraft))
+        except ValidationError as error:
+            found = error.errors(include_url=False)[0]
+            key = ".".join(("aircraft", *map(str, found["loc"])))
+            raise ValueError(f"groups[{number}].{key}: {found['msg']}") from None

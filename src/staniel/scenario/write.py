@@ -41,6 +41,8 @@ def format_value(value: Any) -> str:  # noqa: ANN401 - whatever stood in the fil
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, Config):
+        return format_value(value.model_dump(exclude_none=True))
     if isinstance(value, tuple | list):
         return "[" + ", ".join(map(format_value, value)) + "]"
     if isinstance(value, dict):

@@ -1,0 +1,41 @@
+"""What threats and no-fly regions did to each aircraft, from the fine samples of a record."""
+
+from typing import Any
+
+import numpy as np
+
+from staniel.datatypes.truth import FLYING
+from staniel.metrics.visible import condition_samples, sample_step
+from staniel.record import Record
+from staniel.world.risk import Hazards
+
+__all__ = ["danger_metrics"]
+
+
+def danger_metrics(record: Record) -> list[dict[str, Any]]:
+    """The figures of each aircraft, see ``docs/metrics.md``; zeros without risk regions.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    list of dict
+        With ``risk_exposure``, ``no_fly_seconds`` and ``no_fly_violations``.
+
+    Raises
+    ------
+    RecordError
+        The record's scenario has a risk section that no scenario can have.
+    """
+    paths = record.fine_aircraft.copy()
+    paths[~condition_samples(record, FLYING)] = np.nan
+    exposure = Hazards(record.risk).exposure(
+        paths, record.fine_vehicles, sample_step(record.fine_times)
+    )
+    columns = (exposure.risk.tolist(), exposure.no_fly.tolist(), exposure.violations.tolist())
+    return [
+        {"risk_exposure": risk, "no_fly_seconds": seconds, "no_fly_violations": count}
+        for risk, seconds, count in zip(*columns, strict=True)
+    ]

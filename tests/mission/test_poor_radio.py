@@ -1,0 +1,57 @@
+"""The team over a radio that is late, repeats itself and is shadowed: it still finds vehicles."""
+
+import numpy as np
+import pytest
+
+import staniel
+from staniel.recording import read_record
+from staniel.scenario import load_scenario
+
+POOR = {
+    "latency": 1.5,
+    "jitter": 2.0,
+    "duplication": 0.2,
+    "building_loss": 0.5,
+    "bandwidth": 2000.0,
+    "partitions": [{"start": 60.0, "end": 90.0, "groups": [[0, 1], [2, 3]]}],
+}
+
+
+@pytest.fixture(scope="module")
+def poor(tmp_path_factory):
+    out = tmp_path_factory.mktemp("poor") / "run"
+    run = staniel.fly(load_scenario("downtown", minutes=3.0, radio=POOR), out=out)
+    return run, read_record(out)
+
+
+def test_the_team_finds_vehicles_all_the_same(poor):
+    run, _ = poor
+    found = [t for t in run.metrics["targets"] if t["found_at"] is not None]
+    assert len(found) >= 2
+    assert run.metrics["team"]["auctions"] > 0
+    assert run.metrics["complete"]
+
+
+def test_no_message_crosses_the_partition_and_the_links_say_who_heard_whom(poor):
+    run, record = poor
+    team, messages = run.metrics["team"], record.messages
+    assert int(record.links.sum()) == team["messages_delivered"]
+    assert np.array_equal(
+        record.links.sum(axis=1),
+        [messages["heard"][messages["sender"] == k].sum() for k in range(4)],
+    )
+    during = messages[(messages["time"] >= 60.0) & (messages["time"] < 90.0)]
+    assert len(during) > 100
+    assert during["heard"].max() <= 1
+    shares = np.array(team["links"], dtype=float)
+    assert np.isnan(shares.diagonal()).all()
+    # A sixth of the time half the team is cut off, beside what distance takes.
+    assert np.nanmax(shares[:2, 2:]) < 31 / 36 < np.nanmax(shares[:2, :2])
+    assert all(0.4 < aircraft["heard_share"] < 1.0 for aircraft in run.metrics["aircraft"])
+
+
+def test_it_is_the_same_run_again(poor, tmp_path):
+    run, _ = poor
+    again = staniel.fly(load_scenario("downtown", minutes=3.0, radio=POOR), out=tmp_path / "run")
+    metrics = {key: value for key, value in run.metrics.items() if key != "real_time_factor"}
+    assert metrics == {k: v for k, v in again.metrics.items() if k != "real_time_factor"}
