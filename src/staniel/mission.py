@@ -13,7 +13,7 @@ from staniel.datatypes.command import Command, FlyBanks
 from staniel.datatypes.message import Message
 from staniel.datatypes.truth import FLYING, Truth
 from staniel.record import Frame
-from staniel.world import Cameras, Lidars, Radio, World, impair
+from staniel.world import Lidars, MixedCameras, Radio, World, impair
 
 __all__ = ["Mission"]
 
@@ -29,7 +29,7 @@ class Mission:
     ----------
     world : World
         Vehicles drive, aircraft fly.
-    cameras : Cameras
+    cameras : MixedCameras
         What each aircraft sees of it.
     radio : Radio
         What each hears of the others.
@@ -44,7 +44,7 @@ class Mission:
     """
 
     world: World
-    cameras: Cameras
+    cameras: MixedCameras
     radio: Radio
     agents: list[Agent]
     start: Truth

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from staniel.city import City
 from staniel.datatypes.belief import Belief, Percept
 from staniel.datatypes.command import Command
+from staniel.datatypes.equipment import Camera
 from staniel.datatypes.message import Delivery
 from staniel.datatypes.risk import RiskConfig
 from staniel.datatypes.truth import CONDITION_COLUMNS, Truth, nominal
@@ -163,6 +164,30 @@ class Record:
         ends[decided + 1, rows["agent"]] = np.where(line, second, first)
         looks: NDArray[np.float64] = ends[np.searchsorted(self.times, times - _SAME)]
         return looks
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The camera of each aircraft, as the run's scenario has it.
+
+        Raises
+        ------
+        RecordError
+            A camera or a group that no scenario can have.
+        """
+        count = self.aircraft.shape[1]
+        try:
+            common = dict(self.scenario.get("camera", {}))
+            groups = [(group["count"], group) for group in self.scenario.get("groups", ())]
+            kinds = [
+                camera
+                for number, group in groups or [(count, {})]
+                for camera in [Camera(**(common | dict(group.get("camera", {}))))] * number
+            ]
+        except (ValidationError, TypeError, KeyError, ValueError) as error:
+            raise RecordError(f"scenario.camera or scenario.groups: {error}") from error
+        if len(kinds) != count:
+            raise RecordError(f"scenario.groups: {len(kinds)} aircraft, expected {count}")
+        return tuple(kinds)
 
     @property
     def risk(self) -> RiskConfig:

@@ -1,5 +1,6 @@
 """Faults, endurance, launches and kinds of aircraft: when they come and what they do."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -26,6 +27,9 @@ from staniel.datatypes.truth import (
     nominal,
 )
 from staniel.errors import ScenarioError
+from staniel.flight import fly
+from staniel.kernels.footprint import camera_axes, look
+from staniel.metrics.visible import visible_samples
 from staniel.recording import read_record
 from staniel.scenario import Scenario, build_city, dump_scenario, load_scenario
 from staniel.scenario.assemble import assemble
@@ -221,9 +225,60 @@ def test_groups_differ_only_in_what_they_say():
     assert load_scenario("downtown").airframes == (load_scenario("downtown").aircraft,) * 4
 
 
+def test_each_kind_sees_with_its_own_camera():
+    """Of every aircraft the sightings are those in a team that carries its camera throughout."""
+    eyes = ({"range": 250.0}, {"mount": "nadir", "half_aperture_deg": 40.0, "noise": 3.0})
+    groups = tuple({"count": 2, "camera": eye} for eye in eyes)
+    mixed = load_scenario("downtown", groups=groups)
+    assert [camera.mount for camera in mixed.cameras] == ["body", "body", "nadir", "nadir"]
+    city = build_city(mixed.city, mixed.seed)
+    truth = assemble(mixed, city).start
+    seen = 0
+    for tick in range(40):
+        later = dataclasses.replace(truth, tick=tick, time=float(tick))
+        percepts, origins = assemble(mixed, city).cameras.sense(later)
+        for kind, eye in enumerate(eyes):
+            team = assemble(load_scenario("downtown", camera=eye), city).cameras
+            alone, sources = team.sense(later)
+            for i in (2 * kind, 2 * kind + 1):
+                assert percepts[i] == alone[i]
+                assert origins[i] == sources[i]
+                seen += len(alone[i].sightings)
+    assert seen > 0
+
+
+def test_visibility_is_measured_with_each_aircrafts_own_camera(tmp_path):
+    """Blind all but one kind: then only what that kind covers counts as visible."""
+    blind = {"half_aperture_deg": 0.01}
+    groups = ({"count": 1}, {"count": 3, "camera": blind})
+    mixed = fly(load_scenario("downtown", minutes=6.0, groups=groups), out=tmp_path / "a")
+    record = mixed.record
+    assert [camera.half_aperture_deg for camera in record.cameras] == [60.0, 0.01, 0.01, 0.01]
+    height = record.cameras[0].target_height
+    points = np.full((*record.fine_vehicles.shape[:2], 3), height)
+    points[:, :, :2] = record.fine_vehicles[:, :, :2]
+    by_hand = np.array(
+        [
+            look(
+                record.city.walls,
+                poses[:1],
+                camera_axes(poses[:1], np.full((1, 2), np.nan), record.cameras[0].mounting),
+                places,
+                record.cameras[0].half_aperture,
+                record.cameras[0].range,
+            )[0]
+            for poses, places in zip(record.fine_aircraft, points, strict=True)
+        ]
+    )
+    assert np.array_equal(visible_samples(record), by_hand)
+    assert 0 < by_hand.sum() < by_hand.size
+
+
 @pytest.mark.parametrize(
     ("groups", "message"),
     [
+        (({"count": 4, "camera": {"rnge": 3.0}},), r"groups\[0\].camera.rnge: Extra"),
+        (({"count": 4, "camera": {"range": -3.0}},), r"groups\[0\].camera.range: .* greater"),
         (GROUPS[:1], "groups have 1 aircraft together, but aircraft.count = 4"),
         (({"count": 4, "aircraft": {"sped": 3.0}},), r"groups\[0\].aircraft.sped: Extra"),
         (({"count": 4, "aircraft": {"speed": -3.0}},), r"groups\[0\].aircraft.speed: .* greater"),

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.datatypes.equipment import Camera
 from staniel.datatypes.truth import CAMERA
 from staniel.kernels.visibility import seen_by
 from staniel.record import Record
@@ -28,20 +27,30 @@ def visible_samples(record: Record) -> NDArray[np.bool_]:
     (m, n_vehicles) bool array
         At ``record.fine_times``.
     """
-    camera = Camera(**record.scenario["camera"])
-    poses = np.array(record.fine_aircraft, dtype=np.float64)
-    poses[~condition_samples(record, CAMERA), 2] = _NOWHERE
-    counts = seen_by(
-        record.city.walls,
-        poses,
-        np.ascontiguousarray(record.fine_vehicles, dtype=np.float64),
-        camera.target_height,
-        camera.half_aperture,
-        camera.range,
-        camera.mounting,
-        record.looks(record.fine_times),
-    )
-    return counts > 0
+    cameras = record.cameras
+    vehicles = np.ascontiguousarray(record.fine_vehicles, dtype=np.float64)
+    works, looks = condition_samples(record, CAMERA), record.looks(record.fine_times)
+    visible = np.zeros(vehicles.shape[:2], dtype=np.bool_)
+    for k, camera in enumerate(cameras):
+        if camera in cameras[:k]:
+            continue
+        # One kind at a time: the cameras of the others, and dead ones, are nowhere.
+        poses = np.array(record.fine_aircraft, dtype=np.float64)
+        poses[~(works & [other == camera for other in cameras]), 2] = _NOWHERE
+        visible |= (
+            seen_by(
+                record.city.walls,
+                poses,
+                vehicles,
+                camera.target_height,
+                camera.half_aperture,
+                camera.range,
+                camera.mounting,
+                looks,
+            )
+            > 0
+        )
+    return visible
 
 
 def condition_samples(record: Record, column: int) -> NDArray[np.bool_]:

@@ -2,17 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
-from pydantic import ValidationError
 
 from staniel.city.coverage import footprint
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.equipment import Camera
+from staniel.errors import RecordError
 from staniel.kernels.footprint import camera_axes
 from staniel.pictures import style
 from staniel.pictures.page import MAP_SIDE, SMOOTH, draw_clock, draw_page, draw_triangle
@@ -49,7 +49,7 @@ class Canvas:
         self._scale = MAP_SIDE * SMOOTH / max(east, north)
         shown = (max(1, round(east * self._scale)), max(1, round(north * self._scale)))
         self._north = shown[1]
-        self._camera = _camera(record.scenario)
+        self._cameras = _cameras(record)
         self._paths = _paths(record)
         self._rows = {
             name: _by_tick(getattr(record, name), record.times)
@@ -108,13 +108,14 @@ class Canvas:
         return picture
 
     def _draw_footprints(self, draw: ImageDraw.ImageDraw, tick: int) -> None:
-        camera = self._camera
-        if camera is None:
+        cameras = self._cameras
+        if cameras is None:
             return
         poses = np.ascontiguousarray(self._record.aircraft[tick])
         looks = self._record.looks(self._record.times[tick : tick + 1])[0]
-        axes = camera_axes(poses, looks, camera.mounting)
-        for identity, (pose, axis) in enumerate(zip(poses.tolist(), axes, strict=True)):
+        for identity, (pose, camera) in enumerate(zip(poses.tolist(), cameras, strict=True)):
+            own = slice(identity, identity + 1)
+            (axis,) = camera_axes(poses[own], looks[own], camera.mounting)
             if np.isnan(axis[0]):
                 continue
             seen = footprint(Pose(*pose), camera.half_aperture, camera.range, axis=axis)
@@ -178,14 +179,14 @@ class Canvas:
             draw_triangle(draw, place, float(poses[identity, 3]), style.of_aircraft(identity))
 
 
-def _camera(scenario: Mapping[str, Any]) -> Camera | None:
-    """The camera; None where the scenario does not say its cone and range."""
-    camera = scenario.get("camera")
+def _cameras(record: Record) -> tuple[Camera, ...] | None:
+    """Each aircraft's camera; None where the scenario does not say its cone and range."""
+    camera = record.scenario.get("camera")
     if not isinstance(camera, Mapping) or not {"half_aperture_deg", "range"} <= camera.keys():
         return None
     try:
-        return Camera.model_validate(camera)
-    except ValidationError:
+        return record.cameras
+    except RecordError:
         return None
 
 

@@ -9,7 +9,7 @@ from staniel.city import City
 from staniel.errors import ScenarioError
 from staniel.mission import Mission
 from staniel.scenario.model import Scenario
-from staniel.world import Cameras, Lidars, Radio, World
+from staniel.world import Lidars, MixedCameras, Radio, World
 
 __all__ = ["assemble", "kernels_of"]
 
@@ -39,9 +39,11 @@ def assemble(scenario: Scenario, city: City) -> Mission:
     seeds = np.random.SeedSequence(scenario.seed).spawn(5)
     world_seed, camera_seed, radio_seed, agent_seed, lidar_seed = seeds
     team, clock = scenario.aircraft, scenario.clock
-    if scenario.camera.delay > scenario.tracking.late_limit:
+    cameras, airframes = scenario.cameras, scenario.airframes
+    slowest = max(camera.delay for camera in cameras)
+    if slowest > scenario.tracking.late_limit:
         raise ScenarioError(
-            f"camera.delay = {scenario.camera.delay:g} s: expected at most "
+            f"camera.delay = {slowest:g} s: expected at most "
             f"tracking.late_limit = {scenario.tracking.late_limit:g} s, or no sighting is used"
         )
     chart = City.open(city.size) if scenario.chart == "blank" else replace(city)
@@ -55,7 +57,6 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         guidance=scenario.guidance,
         risk=scenario.risk.briefed,
     )
-    airframes = scenario.airframes
     world = World(
         city,
         team,
@@ -71,7 +72,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
     lidar = scenario.lidar
     return Mission(
         world=world,
-        cameras=Cameras(city, scenario.camera, team.altitude, camera_seed, clock),
+        cameras=MixedCameras(city, cameras, team.altitude, camera_seed, clock),
         radio=Radio(
             scenario.radio,
             radio_seed.generate_state(1, np.uint64)[0],
@@ -80,7 +81,9 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         ),
         agents=[
             Agent(
-                number, replace(briefing, airframe=airframes[number]), np.random.default_rng(seed)
+                number,
+                replace(briefing, airframe=airframes[number], camera=cameras[number]),
+                np.random.default_rng(seed),
             )
             for number, seed in enumerate(agent_seed.spawn(team.count))
         ],

@@ -1,6 +1,6 @@
 """What a scenario holds: the rooms' own sections, composed into one frozen, checked whole."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -21,6 +21,8 @@ from staniel.tracking.config import TrackingConfig
 from staniel.world.config import Faults, Launch, Traffic, Wind
 
 __all__ = ["CITY_KEYS", "Aircraft", "CitySource", "Group", "Scenario"]
+
+_Kind = TypeVar("_Kind", bound=Config)
 
 Metres = Annotated[float, Field(gt=0.0, le=1e5)]
 
@@ -93,6 +95,9 @@ class Group(Config):
     count: int = Field(ge=1, le=500, description="aircraft of this kind")
     aircraft: dict[str, float] = Field(
         {}, max_length=50, description="what differs from the section aircraft, by its keys"
+    )
+    camera: dict[str, float | str] = Field(
+        {}, max_length=50, description="what differs from the section camera, by its keys"
     )
 
 
@@ -171,8 +176,9 @@ class Scenario(Config):
                     f"groups have {together} aircraft together, but aircraft.count = "
                     f"{self.aircraft.count}: expected the same"
                 )
-            for number, group in enumerate(self.groups):
-                self._airframe(number, group)
+            for number in range(len(self.groups)):
+                self._kind(number, "aircraft", Airframe)
+                self._kind(number, "camera", Camera)
         return self
 
     @property
@@ -183,14 +189,26 @@ class Scenario(Config):
         return tuple(
             airframe
             for number, group in enumerate(self.groups)
-            for airframe in (self._airframe(number, group),) * group.count
+            for airframe in (self._kind(number, "aircraft", Airframe),) * group.count
         )
 
-    def _airframe(self, number: int, group: Group) -> Airframe:
-        common = self.aircraft.model_dump(exclude={"count"})
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """What each aircraft of the team carries, in the order of the team."""
+        if not self.groups:
+            return (self.camera,) * self.aircraft.count
+        return tuple(
+            camera
+            for number, group in enumerate(self.groups)
+            for camera in (self._kind(number, "camera", Camera),) * group.count
+        )
+
+    def _kind(self, number: int, section: str, kind: type[_Kind]) -> _Kind:
+        """A section as one group has it: the team's, but for what the group says otherwise."""
+        common = getattr(self, section).model_dump(exclude={"count"})
         try:
-            return Airframe(**(common | group.aircraft))
+            return kind(**(common | getattr(self.groups[number], section)))
         except ValidationError as error:
-            found = error.errors(include_url=False)[0]
-            key = ".".join(("aircraft", *map(str, found["loc"])))
-            raise ValueError(f"groups[{number}].{key}: {found['msg']}") from None
+            first = error.errors(include_url=False)[0]
+            key = ".".join((section, *map(str, first["loc"])))
+            raise ValueError(f"groups[{number}].{key}: {first['msg']}") from None

@@ -3,6 +3,7 @@
 from staniel.world.camera import Cameras
 from staniel.world.config import Faults, Launch, Traffic, Wind
 from staniel.world.faults import impair
+from staniel.world.kinds import MixedCameras
 from staniel.world.lidar import Lidars
 from staniel.world.radio import Radio
 from staniel.world.risk import Exposure, Hazards
@@ -15,6 +16,7 @@ __all__ = [
     "Hazards",
     "Launch",
     "Lidars",
+    "MixedCameras",
     "Radio",
     "Traffic",
     "Wind",
