@@ -1,0 +1,133 @@
+"""One mind by itself: percepts and messages in by hand, commands and messages out."""
+
+import math
+
+import numpy as np
+import pytest
+
+from staniel.agent import Agent, Briefing
+from staniel.city import City
+from staniel.cooperation import CooperationConfig
+from staniel.datatypes.belief import Percept, Pose, Sighting
+from staniel.datatypes.clock import Clock
+from staniel.datatypes.command import FlyLine, FlyOrbit
+from staniel.datatypes.equipment import Airframe, Camera
+from staniel.datatypes.message import Announce, Award, Heartbeat, Release, Report
+from staniel.guidance import GuidanceConfig
+from staniel.tracking import TrackingConfig
+
+GUIDANCE = GuidanceConfig()
+SIGMA = np.eye(2) * 1.5**2
+
+
+def agent_of(number=0):
+    briefing = Briefing(
+        chart=City.open((600.0, 600.0)),
+        clock=Clock(),
+        airframe=Airframe(),
+        camera=Camera(),
+        tracking=TrackingConfig(),
+        cooperation=CooperationConfig(),
+        guidance=GUIDANCE,
+    )
+    return Agent(number, briefing, np.random.default_rng(3))
+
+
+def place(k):
+    """A vehicle that drives east at 2 m/s."""
+    return 300.0 + 2.0 * k, 320.0
+
+
+def see(k, reporter=0):
+    return Sighting(float(k), place(k), SIGMA, reporter=reporter)
+
+
+def percept(k, *sightings, pose=None):
+    return Percept(float(k), pose or Pose(150.0, 300.0, 80.0, 0.0, 0.0, 15.0), sightings)
+
+
+def said(outbox, kind):
+    return [message for message in outbox if isinstance(message, kind)]
+
+
+@pytest.fixture
+def holder():
+    """An agent that found a vehicle by itself and was awarded it by its own auction."""
+    agent, log = agent_of(), []
+    for k in range(12):
+        command, outbox = agent.step(percept(k, see(k)), [])
+        log += outbox
+    assert agent.belief.role == "pursue"
+    return agent, log, command
+
+
+def test_a_lone_finder_announces_awards_itself_and_holds(holder):
+    agent, log, _ = holder
+    (announced, *_) = said(log, Announce)
+    (award,) = said(log, Award)
+    assert announced.time == 2.0  # the third consistent detection
+    assert award.winner == agent.id == 0
+    assert award.time == announced.time + CooperationConfig().bid_wait
+    assert said(log, Heartbeat)[-1].target == award.target == agent.belief.target
+    assert len(said(log, Heartbeat)) == len(said(log, Report)) == 12
+
+
+def test_pursuit_flies_to_the_prediction_three_steps_ahead(holder):
+    agent, _, command = holder
+    (track,) = agent.belief.tracks
+    assert isinstance(command, FlyLine)
+    assert command.end == pytest.approx(tuple(track.position + 3.0 * track.velocity))
+    assert command.end == pytest.approx(place(11 + 3), abs=5.0)
+
+
+def test_pursuit_circles_when_close(holder):
+    agent, _, _ = holder
+    above = Pose(place(12)[0] - 30.0, place(12)[1], 80.0, 0.0, 0.0, 15.0)
+    command, _ = agent.step(percept(12, see(12), pose=above), [])
+    assert isinstance(command, FlyOrbit)
+    assert command.radius == GUIDANCE.loiter_radius
+
+
+def test_a_lost_target_is_released_its_last_place_circled_and_then_left(holder):
+    agent, _, _ = holder
+    released, roles = None, {}
+    for k in range(12, 80):
+        command, outbox = agent.step(percept(k), [])
+        roles[k] = agent.belief.role
+        for release in said(outbox, Release):
+            released = k
+            assert release.lost
+        if roles[k] == "recover":
+            assert isinstance(command, FlyOrbit)
+            # Where it last was by the belief: not further than it can have driven unseen.
+            assert math.dist(command.center, place(11)) < 2.5 * 17
+    unseen = TrackingConfig().unseen_limit
+    assert released is not None
+    assert released - 11 <= unseen + 1
+    assert roles[released] == "recover"
+    assert agent.belief.target is None
+    searching = [k for k, role in roles.items() if role == "search"]
+    assert searching[0] - released == pytest.approx(GUIDANCE.recover_time, abs=2.0)
+    assert agent.belief.tracks == []
+
+
+def test_what_others_saw_becomes_a_track_of_ones_own():
+    agent = agent_of(1)
+    for k in range(1, 8):
+        # Said in tick k - 1, heard in tick k.
+        report = Report(0, k, k - 1.0, sightings=(see(k - 1, reporter=0),))
+        _, outbox = agent.step(percept(k), [report])
+        assert not said(outbox, Report)
+    (track,) = agent.belief.tracks
+    assert math.dist(track.position, place(7)) < 5.0
+    # It did not see it itself: the auction is the finder's to open.
+    assert agent.belief.role == "search"
+
+
+def test_a_searching_agent_flies_a_leg_to_its_goal():
+    agent = agent_of()
+    command, outbox = agent.step(percept(0), [])
+    assert isinstance(command, FlyLine)
+    (heartbeat,) = said(outbox, Heartbeat)
+    assert heartbeat.role == "search"
+    assert heartbeat.goal == command.end == agent.belief.goal
