@@ -2,7 +2,7 @@
 
 from staniel.metrics.compute import compute_metrics
 from staniel.metrics.flown import EXPOSURE_RANGE
-from staniel.metrics.following import GATE
+from staniel.metrics.following import GATE, gospa_steps
 from staniel.metrics.gospa import CUTOFF, ORDER, Gospa, gospa
 from staniel.metrics.picture import team_picture
 
@@ -14,5 +14,6 @@ __all__ = [
     "Gospa",
     "compute_metrics",
     "gospa",
+    "gospa_steps",
     "team_picture",
 ]

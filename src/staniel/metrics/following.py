@@ -10,7 +10,7 @@ from staniel.metrics.gospa import CUTOFF, ORDER, gospa_of_squares
 from staniel.metrics.picture import freshest, id_codes
 from staniel.record import Record
 
-__all__ = ["GATE", "Following", "IdentityKeeper", "follow"]
+__all__ = ["GATE", "Following", "IdentityKeeper", "follow", "gospa_steps"]
 
 GATE = 10.0
 """A track is a vehicle's as long as it is within this distance of it [m]."""
@@ -200,3 +200,19 @@ def _errors(
     turned = wrap_array(np.arctan2(rows["vy"], rows["vx"]) - np.arctan2(vy, vx))
     course[where] = np.where(np.abs(truth[:, 3]) >= STANDING, turned, np.nan)
     return position, speed, course
+
+
+def gospa_steps(record: Record) -> Floats:
+    """GOSPA of each decision instant, between all vehicles and the team picture.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    (n, 4) float array
+        Distance [m], and its parts for localisation, missed vehicles and false tracks [m²], at
+        ``record.times``; see `staniel.metrics.Gospa`.
+    """
+    return follow(record).gospa
