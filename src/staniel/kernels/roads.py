@@ -1,4 +1,4 @@
-"""Driving on roads: speed by corners and by who is ahead, stops, and the next step.
+"""Driving on roads: stops, turns, and the next step.
 
 Columns, corners and legs are those of `staniel.kernels.routes`.
 """
@@ -9,20 +9,25 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.headway import (
+    FARTHEST,
+    follow_speed,
+    in_the_way,
+    junction_size,
+    junction_speed,
+    road_speed,
+)
 from staniel.kernels.neighbours import neighbours, rebuild_every
 from staniel.kernels.random import fold
 from staniel.kernels.routes import (
     ARC,
-    CLAIM,
     CURVE,
     CUT,
-    DETOUR,
     FILLET,
     HOLD,
     LEFT,
     MEMORY_WIDTH,
     NEAR,
-    NEXT,
     NX,
     NY,
     PHASE,
@@ -48,152 +53,8 @@ __all__ = ["follow", "warm"]
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_GAP = 0.5  # kept to the vehicle ahead at rest [m]
-_ASIDE = 0.3  # who is farther aside than two radii and that is not in the way [m]
 _CRAWL = 1.0  # speed of who squeezes past [m/s]
-_FARTHEST = 60.0  # no driver looks farther ahead [m]
 _LEGS = 8  # at most so many legs and fillets in one dynamics step
-
-
-@njit(cache=True, error_model="numpy")
-def _in_the_way(
-    vehicles: Array,
-    other: int,
-    x: float,
-    y: float,
-    ux: float,
-    uy: float,
-    length: float,
-    r: float,
-) -> float:
-    """How far along a leg the other vehicle is [m], negative where it is not in the way."""
-    dx, dy = vehicles[other, 0] - x, vehicles[other, 1] - y
-    along, aside = dx * ux + dy * uy, abs(dx * uy - dy * ux)
-    if aside > 2.0 * r + _ASIDE or along <= 0.0 or along > length + 2.0 * r:
-        return -1.0
-    return float(along)
-
-
-@njit(cache=True, error_model="numpy")
-def _behind(speed: float, gap: float, brake: float, dt: float) -> float:
-    """Greatest speed from which one can slow down to `speed` within `gap`, in steps of `dt`."""
-    if gap <= 0.0:
-        return speed
-    step = brake * dt
-    return max(math.sqrt(step * step + speed * speed + 2.0 * brake * gap) - step, 0.0)
-
-
-@njit(cache=True, error_model="numpy")
-def _follow_speed(
-    vehicles: Array,
-    memory: Array,
-    near: Indices,
-    begin: int,
-    end: int,
-    i: int,
-    habits: Array,
-    dt: float,
-) -> float:
-    """Greatest speed that keeps the distance to whoever is on the next two legs [m/s]."""
-    r, brake = habits[0], habits[3]
-    x, y = vehicles[i, 0], vehicles[i, 1]
-    wx, wy = memory[i, NX] - memory[i, TX], memory[i, NY] - memory[i, TY]
-    second = math.hypot(wx, wy)
-    wx, wy = (wx / second, wy / second) if second > 0.0 else (0.0, 0.0)
-    cut = memory[i, CUT] if memory[i, PHASE] == FILLET else 0.0
-    tx, ty = memory[i, TX] + cut * wx, memory[i, TY] + cut * wy
-    ux, uy = tx - x, ty - y
-    leg = math.hypot(ux, uy)
-    ux, uy = (ux / leg, uy / leg) if leg > 0.0 else (wx, wy)
-    most = math.inf
-    for k in range(begin, end):
-        j = near[k]
-        speed, heading = vehicles[j, 3], vehicles[j, 2]
-        along = _in_the_way(vehicles, j, x, y, ux, uy, leg, r)
-        ahead = math.cos(heading) * ux + math.sin(heading) * uy
-        if along < 0.0:
-            along = _in_the_way(vehicles, j, tx, ty, wx, wy, second - cut, r)
-            if along < 0.0:
-                continue
-            along += leg
-            ahead = math.cos(heading) * wx + math.sin(heading) * wy
-        gap = along - 2.0 * r - _GAP
-        most = min(most, _behind(max(speed * ahead, 0.0), gap, brake, dt))
-    return most
-
-
-@njit(cache=True, error_model="numpy")
-def _junction_speed(
-    roads: Roads,
-    vehicles: Array,
-    memory: Array,
-    near: Indices,
-    begin: int,
-    end: int,
-    i: int,
-    habits: Array,
-    dt: float,
-) -> float:
-    """Greatest speed that stops before the next junction while it is somebody else's [m/s].
-
-    Who comes so near that it would have to brake claims a junction that nobody is on, nobody has
-    claimed and nobody is nearer to on the same arc: so one after the other goes through.
-    """
-    arc = memory[i, ARC]
-    node = roads.arcs[int(arc), 1]
-    x, y, size = roads.nodes[node, 0], roads.nodes[node, 1], _junction_size(habits)
-    own = int(memory[i, CLAIM]) - 1
-    if own >= 0 and own != node:
-        dx, dy = vehicles[i, 0] - roads.nodes[own, 0], vehicles[i, 1] - roads.nodes[own, 1]
-        if dx * dx + dy * dy > size * size:
-            memory[i, CLAIM] = 0.0
-    if own == node or roads.first[node + 1] - roads.first[node] < 3:
-        return math.inf
-    way = math.hypot(vehicles[i, 0] - x, vehicles[i, 1] - y)
-    most = _behind(0.0, way - size - NEAR, habits[3], dt)
-    if way <= size:
-        return math.inf
-    if most > vehicles[i, 3] + habits[3] * dt or way > _FARTHEST:
-        return most
-    for k in range(begin, end):
-        j = near[k]
-        apart = math.hypot(vehicles[j, 0] - x, vehicles[j, 1] - y)
-        nearer = memory[j, ARC] == arc and apart < way
-        if nearer or apart < size or memory[j, CLAIM] == node + 1.0:
-            return most
-    memory[i, CLAIM] = node + 1.0
-    return math.inf
-
-
-@njit(cache=True, error_model="numpy")
-def _junction_size(habits: Array) -> float:
-    """Distance from a junction's middle at which one waits for who is on it [m]."""
-    return float(habits[1] + 2.0 * habits[0] + 1.0)
-
-
-@njit(cache=True, error_model="numpy")
-def _corner_speed(memory: Array, i: int, turn_rate: float) -> float:
-    """Speed in the fillet at T, or 0 where one turns in place [m/s]."""
-    if memory[i, CUT] > 0.0:
-        return float(turn_rate * memory[i, CURVE])
-    return math.inf if abs(memory[i, TURN]) < SLIGHT else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _road_speed(
-    roads: Roads, memory: Array, i: int, x: float, y: float, habits: Array, dt: float
-) -> float:
-    """Greatest speed that the corners ahead allow [m/s]."""
-    corner = _corner_speed(memory, i, habits[2])
-    leg = math.hypot(memory[i, NX] - memory[i, TX], memory[i, NY] - memory[i, TY])
-    beyond = 0.0 if memory[i, DETOUR] != 0.0 else roads.entry[int(memory[i, NEXT])]
-    if memory[i, PHASE] == FILLET:
-        return min(corner, beyond)
-    way = math.hypot(memory[i, TX] - x, memory[i, TY] - y)
-    most = _behind(min(corner, beyond), way - memory[i, CUT], habits[3], dt)
-    if memory[i, DETOUR] != 0.0:
-        most = max(most, _behind(0.0, way + leg, habits[3], dt))
-    return min(most, _behind(corner, way - memory[i, CUT], habits[3], dt))
 
 
 @njit(cache=True, error_model="numpy")
@@ -298,7 +159,7 @@ def _room_to_turn(
     ux, uy = trial[0, TX] - x, trial[0, TY] - y
     leg = math.hypot(ux, uy)
     for k in range(begin, end):
-        if _in_the_way(vehicles, near[k], x, y, ux / leg, uy / leg, 8.0 * r, r) > 0.0:
+        if in_the_way(vehicles, near[k], x, y, ux / leg, uy / leg, 8.0 * r, r) > 0.0:
             return False
     return True
 
@@ -336,10 +197,10 @@ def _follow_one(
         return
     back, slowly = roads.arcs[int(memory[i, ARC]), 2], 1.0
     standing = _wait(memory, i, speed, habits, dt, key)
-    wish = 0.0 if standing else min(top, _road_speed(roads, memory, i, x, y, habits, dt))
+    wish = 0.0 if standing else min(top, road_speed(roads, memory, i, x, y, habits, dt))
     if wish > 0.0 and begin < end:
-        others = _follow_speed(vehicles, memory, near, begin, end, i, habits, dt)
-        junction = _junction_speed(roads, vehicles, memory, near, begin, end, i, habits, dt)
+        others = follow_speed(vehicles, memory, near, begin, end, i, habits, dt)
+        junction = junction_speed(roads, vehicles, memory, near, begin, end, i, habits, dt)
         if memory[i, STUCK] > patience:
             others = max(others, _CRAWL)
             if back < 0:
@@ -425,7 +286,7 @@ def follow(
     for i in range(n):
         fastest = max(fastest, speeds[i])
     braking = fastest * fastest / (2.0 * habits[3])
-    reach = 4.0 * habits[0] + 2.0 * (_junction_size(habits) + min(braking, _FARTHEST))
+    reach = 4.0 * habits[0] + 2.0 * (junction_size(habits) + min(braking, FARTHEST))
     every = rebuild_every(reach, fastest, dt, substeps)
     first, near = neighbours(now, reach + 2.0 * fastest * dt * every)
     for k in range(substeps):
