@@ -4,7 +4,14 @@ Every one of them is a `StanielError`; the command line prints its message and e
 2. A message names the field, the value, what was expected and, where there is one, the file.
 """
 
-__all__ = ["CityError", "OutputError", "RecordError", "ScenarioError", "StanielError"]
+__all__ = [
+    "CityError",
+    "OutputError",
+    "RecordError",
+    "ScenarioError",
+    "StanielError",
+    "StudyError",
+]
 
 
 class StanielError(ValueError):
@@ -25,3 +32,7 @@ class RecordError(StanielError):
 
 class OutputError(StanielError):
     """Results cannot be written where they were asked for."""
+
+
+class StudyError(StanielError):
+    """A study cannot be run as asked, or what it left cannot be read."""

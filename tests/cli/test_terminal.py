@@ -6,8 +6,8 @@ import time
 import pytest
 from rich.console import Console
 
-from staniel import terminal
 from staniel.terminal import Reporter
+from staniel.terminal import flight as terminal
 
 
 def reporter(*, tty: bool) -> tuple[Reporter, io.StringIO]:

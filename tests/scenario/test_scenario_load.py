@@ -8,7 +8,7 @@ import pytest
 
 from staniel.errors import ScenarioError
 from staniel.scenario import load_scenario, preset_names, read_settings
-from staniel.scenario.load import MAX_BYTES
+from staniel.scenario.toml import MAX_BYTES
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What pydantic found wrong with a scenario, in words for the person who wrote it."""
+"""What pydantic found wrong with a file, in words for the person who wrote it."""
 
 import difflib
 from collections.abc import Callable, Mapping
@@ -7,7 +7,6 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from staniel.scenario.model import Scenario
 from staniel.scenario.write import format_value
 
 __all__ = ["complaints", "nearest"]
@@ -40,21 +39,24 @@ _EXPECTED = {
 }
 
 
-def complaints(error: ValidationError, where: Callable[[Path], str]) -> str:
+def complaints(error: ValidationError, where: Callable[[Path], str], model: type[BaseModel]) -> str:
     """Every finding on its own line: where, field, value, and what was expected.
 
     Parameters
     ----------
     error : pydantic.ValidationError
-        From validating a `Scenario`.
+        From validating a `model`.
     where : callable
         From the path of a key to the start of its line in the message.
+    model : type of pydantic.BaseModel
+        Such as `staniel.Scenario`.
 
     Returns
     -------
     str
     """
-    return "\n".join(_complaint(found, where) for found in error.errors(include_url=False))
+    findings = error.errors(include_url=False)
+    return "\n".join(_complaint(found, where, model) for found in findings)
 
 
 def nearest(word: str, known: list[str]) -> str:
@@ -63,37 +65,39 @@ def nearest(word: str, known: list[str]) -> str:
     return f'did you mean "{near[0]}"?' if near else "expected one of: " + ", ".join(known)
 
 
-def _complaint(found: ErrorDetails, where: Callable[[Path], str]) -> str:
+def _complaint(found: ErrorDetails, where: Callable[[Path], str], model: type[BaseModel]) -> str:
     location, kind = found["loc"], found["type"]
     path, name = tuple(location), _name(location)
     if kind == "extra_forbidden":
-        known = sorted(_keys(path[:-1]))
+        known = sorted(_keys(model, path[:-1]))
         return f"{where(path)}{name}: unknown key, {nearest(str(path[-1]), known)}"
     if kind == "missing":
         return f"{where(path)}{name}: missing, expected a value"
     if kind == "value_error" and isinstance(found["input"], Mapping | BaseModel):
-        return _about_section(path, str(found["ctx"]["error"]), where)
+        return _about_section(path, str(found["ctx"]["error"]), where, model)
     value = format_value(found["input"])
     value = value if len(value) <= 60 else value[:57] + "..."
-    return f"{where(path)}{name} = {value}: {_expectation(found, path)}"
+    return f"{where(path)}{name} = {value}: {_expectation(found, path, model)}"
 
 
-def _about_section(path: Path, message: str, where: Callable[[Path], str]) -> str:
+def _about_section(
+    path: Path, message: str, where: Callable[[Path], str], model: type[BaseModel]
+) -> str:
     """A finding on several keys at once; by custom its message starts with the key at fault."""
     key = message.split(" ", 1)[0]
-    if key in _keys(path):
+    if key in _keys(model, path):
         return f"{where((*path, key))}{_name((*path, message))}"
     return f"{where(path)}{_name(path)}: {message}" if path else f"{where(path)}{message}"
 
 
-def _expectation(found: ErrorDetails, path: Path) -> str:
+def _expectation(found: ErrorDetails, path: Path, model: type[BaseModel]) -> str:
     if found["type"] == "value_error":
         return str(found["ctx"]["error"])
     words = _EXPECTED.get(found["type"])
     if words is None:
         return found["msg"]
     context = {key: _short(value) for key, value in found.get("ctx", {}).items()}
-    meaning = _keys(path[:-1]).get(str(path[-1]), "")
+    meaning = _keys(model, path[:-1]).get(str(path[-1]), "")
     return f"expected {words.format(**context)}" + (f" ({meaning})" if meaning else "")
 
 
@@ -106,9 +110,8 @@ def _short(value: Any) -> str:  # noqa: ANN401 - a bound of any type
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _keys(path: Path) -> dict[str, str]:
+def _keys(model: type[BaseModel], path: Path) -> dict[str, str]:
     """Keys of the section at a path with their meanings, empty where there is no such section."""
-    model: type[BaseModel] = Scenario
     for part in path:
         if isinstance(part, int):
             continue

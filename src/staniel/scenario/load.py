@@ -8,18 +8,15 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import ValidationError
 
 from staniel.errors import ScenarioError
 from staniel.scenario.complain import complaints, nearest
 from staniel.scenario.lines import find_line, key_lines
 from staniel.scenario.model import CITY_KEYS, Scenario
+from staniel.scenario.toml import parse_toml, plain, read_text
 
-__all__ = ["load_scenario", "preset_names", "preset_text", "read_settings"]
-
-MAX_BYTES = 1_000_000
-"""No scenario is longer; what is, was named by mistake."""
+__all__ = ["anchor", "load_scenario", "preset_names", "preset_text", "read_settings"]
 
 
 def load_scenario(path_or_name: str | PathLike[str], **overrides: Any) -> Scenario:  # noqa: ANN401
@@ -50,12 +47,12 @@ def load_scenario(path_or_name: str | PathLike[str], **overrides: Any) -> Scenar
     2
     """
     text, label, folder = _read(path_or_name)
-    data = _parse(text, label)
+    data = parse_toml(text, label)
     if folder is not None:
         data.setdefault("name", _as_name(Path(label).stem))
-        _anchor(data, folder)
+        anchor(data, folder)
     changes = read_settings(overrides.items())
-    _anchor(changes, Path.cwd())
+    anchor(changes, Path.cwd())
     _drop_old_source(data, changes)
     _merge(data, changes)
     origin = _Origin(label, key_lines(text), _leaves(changes))
@@ -63,7 +60,7 @@ def load_scenario(path_or_name: str | PathLike[str], **overrides: Any) -> Scenar
         # Strict: a number in quotes is not a number. Lists are tuples by now.
         scenario = Scenario.model_validate(data, strict=True)
     except ValidationError as error:
-        raise ScenarioError(complaints(error, origin.where)) from None
+        raise ScenarioError(complaints(error, origin.where, Scenario)) from None
     _check_pursuit(scenario, origin)
     return scenario
 
@@ -97,7 +94,7 @@ def read_settings(settings: Iterable[str | tuple[str, Any]]) -> dict[str, Any]:
     changes: dict[str, Any] = {}
     for setting in settings:
         key, value = _split(setting) if isinstance(setting, str) else setting
-        nested = _plain(value)
+        nested = plain(value)
         for part in reversed(key.split(".")):
             nested = {part: nested}
         _merge(changes, nested)
@@ -125,52 +122,7 @@ def _read(path_or_name: str | PathLike[str]) -> tuple[str, str, Path | None]:
     if isinstance(path_or_name, str) and path_or_name in names:
         return preset_text(path_or_name), f"{path_or_name}.toml", None
     path = Path(path_or_name)
-    known = f"expected a TOML file or a packaged scenario ({', '.join(names)})"
-    try:
-        if path.is_dir():
-            raise ScenarioError(f"scenario {str(path_or_name)!r} is a folder: {known}")
-        with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        hint = nearest(str(path), names)
-        hint = f"; {hint}" if hint.startswith("did") else ""
-        raise ScenarioError(f"scenario {str(path_or_name)!r} not found: {known}{hint}") from None
-    except OSError as error:
-        reason = error.strerror or error
-        raise ScenarioError(f"scenario {str(path)!r} cannot be read: {reason}; {known}") from None
-    except ValueError as error:
-        if isinstance(error, ScenarioError):
-            raise
-        raise ScenarioError(f"scenario {str(path)!r} cannot be read: {error}; {known}") from None
-    if len(raw) > MAX_BYTES:
-        raise ScenarioError(f"{path}: longer than {MAX_BYTES:,} bytes; {known}")
-    try:
-        return raw.decode("utf-8-sig"), str(path), path.absolute().parent
-    except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        raise ScenarioError(f"{path}, line {line}: not UTF-8 text; {known}") from None
-
-
-def _parse(text: str, label: str) -> dict[str, Any]:
-    try:
-        data: dict[str, Any] = _plain(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{label}: not valid TOML: {error}") from None
-    except (RecursionError, ValueError) as error:
-        reason = "nested too deeply" if isinstance(error, RecursionError) else error
-        raise ScenarioError(f"{label}: not usable TOML: {reason}") from None
-    return data
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401 - any value of TOML or of a caller
-    """Tables as new dicts, lists as tuples, NumPy's numbers and paths as Python's and text."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple(map(_plain, value))
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    return str(value) if isinstance(value, PathLike) else value
+    return read_text(path, "scenario", names), str(path), path.absolute().parent
 
 
 def _split(setting: str) -> tuple[str, Any]:
@@ -204,7 +156,7 @@ def _drop_old_source(data: dict[str, Any], changes: Mapping[str, Any]) -> None:
             old.pop("roads", None)
 
 
-def _anchor(data: dict[str, Any], folder: Path) -> None:
+def anchor(data: dict[str, Any], folder: Path) -> None:
     """Make the names of files absolute."""
     for name, key in (("city", "file"), ("city", "roads"), ("vehicles", "replay")):
         section = data.get(name)

@@ -1,4 +1,4 @@
-"""The command line: `staniel fly | replay | export | scenario`.
+"""The command line: `staniel fly | replay | export | scenario | study`.
 
 Whatever is heavy is imported inside the command that needs it: `staniel --help` is there at once.
 Standard output carries what was asked for (`--json`, a scenario's text) and nothing else; progress,
@@ -6,27 +6,22 @@ tables and errors go to standard error.
 """
 
 import json
-import signal
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
 
 from staniel._version import __version__
+from staniel.cli.interrupt import INTERRUPTED, stop_between_events
+from staniel.cli.study import study_app
 from staniel.errors import StanielError
 
 if TYPE_CHECKING:
     from staniel.scenario import Scenario
 
 __all__ = ["app", "main"]
-
-INTERRUPTED = 130
-"""Exit code of a run that Ctrl-C or SIGTERM cut short: 128 + SIGINT, as shells have it."""
 
 
 class _Group(TyperGroup):
@@ -53,6 +48,7 @@ app = typer.Typer(
 )
 scenario_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(scenario_app, name="scenario", help="Show, list and check scenarios.")
+app.add_typer(study_app, name="study", help="Many runs over factors and seeds, with intervals.")
 
 ScenarioArgument = Annotated[
     str, typer.Argument(metavar="SCENARIO", help="A TOML file or a packaged scenario.")
@@ -126,7 +122,7 @@ def fly(
     quiet: Annotated[bool, typer.Option("--quiet", help="No progress, no tables.")] = False,
 ) -> None:
     """Fly a scenario and record it in a folder of its own."""
-    with _stop_between_events() as stop_if_asked:
+    with stop_between_events() as stop_if_asked:
         chosen = _load(scenario, seed, settings, city, cell, minutes)
         folder = _new_folder(chosen) if out is None else out
 
@@ -266,37 +262,3 @@ def _new_folder(scenario: "Scenario") -> Path:
         number += 1
         folder = Path("runs", f"{name}-{number}")
     return folder
-
-
-@contextmanager
-def _stop_between_events() -> Iterator[Callable[[], None]]:
-    """Hold Ctrl-C and SIGTERM back until the function that this yields is called; not the second.
-
-    An exception out of a signal may strike anywhere: while a compiled kernel takes its arguments it
-    turns into a SystemError, while the record is written it leaves half a message.
-    """
-    asked = False
-
-    def ask(_signal: int, _frame: FrameType | None) -> None:
-        nonlocal asked
-        if asked:
-            raise KeyboardInterrupt
-        asked = True
-
-    def stop_if_asked() -> None:
-        nonlocal asked
-        if asked:
-            asked = False
-            raise KeyboardInterrupt
-
-    # What started us may want us to ignore one of them; then we do.
-    before = {
-        number: signal.signal(number, ask)
-        for number in (signal.SIGINT, signal.SIGTERM)
-        if signal.getsignal(number) is not signal.SIG_IGN
-    }
-    try:
-        yield stop_if_asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
