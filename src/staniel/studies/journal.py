@@ -4,6 +4,7 @@ A line that a kill or a full disk has torn is cut off when the journal is opened
 was whole is lost, and what was torn is flown anew.
 """
 
+import errno
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -81,7 +82,7 @@ class Journal:
         try:
             written = os.write(self._file, line)
             if written < len(line):
-                raise OSError(28, "no space left on device")
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             with suppress(OSError):
                 os.ftruncate(self._file, self._end)

@@ -90,18 +90,20 @@ def run(
         raise StudyError(f"workers = {workers}: expected at least 1")
     points = points_of(study, minutes)
     folder = Path("studies", study.name) if out is None else Path(out)
-    claim_study(folder, study, points)
-    with Journal(folder) as journal:
-        journal.forget(journal.died | (journal.failed if retry else set()))
-        crew: Workers = Cluster(scheduler) if scheduler else Processes(workers)
-        try:
-            if not scheduler:
-                # Once, here: or every worker would compile the same kernels at the same time.
-                _warm(points, tell)
-            _fly_missing(study, points, journal, crew, modules, tell)
-        finally:
-            crew.stop()
-            write_table(folder, study, points, journal)
+    crew: Workers = Cluster(scheduler) if scheduler else Processes(workers)
+    try:
+        claim_study(folder, study, points)
+        with Journal(folder) as journal:
+            journal.forget(journal.died | (journal.failed if retry else set()))
+            try:
+                if not scheduler:
+                    # Once, here: or every worker would compile the same kernels at the same time.
+                    _warm(points, tell)
+                _fly_missing(study, points, journal, crew, modules, tell)
+            finally:
+                write_table(folder, study, points, journal)
+    finally:
+        crew.stop()
     return read_results(folder).table
 
 
