@@ -17,6 +17,7 @@ __all__ = [
     "SKIN",
     "Walls",
     "bare",
+    "fused",
     "hides",
     "over",
     "woven",
@@ -40,6 +41,12 @@ def bare(kernel: Kernel) -> Kernel:
 def woven(kernel: Kernel) -> Kernel:
     """As `bare`, and copied by the compiler into whatever calls it."""
     compiled: Kernel = njit(**_BARE, forceinline=True)(kernel)
+    return compiled
+
+
+def fused(kernel: Kernel) -> Kernel:
+    """As `woven`, for tests with bounds on their rounding: a product and a sum may round once."""
+    compiled: Kernel = njit(**_BARE, forceinline=True, fastmath={"contract"})(kernel)
     return compiled
 
 
