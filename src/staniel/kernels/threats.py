@@ -29,11 +29,12 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 @njit(cache=True, error_model="numpy")
 def _within(regions: Regions, k: int, x: float, y: float) -> bool:
     """Whether (x, y) is over the ground shape of region k."""
-    radius = regions.disc[k, 2]
+    radius, held = regions.disc[k, 2], False
     if radius > 0.0:
         dx, dy = x - regions.disc[k, 0], y - regions.disc[k, 1]
-        return dx * dx + dy * dy <= radius * radius
-    held: bool = in_polygon(regions.corners[regions.first[k] : regions.first[k + 1]], x, y)
+        held = dx * dx + dy * dy <= radius * radius
+    else:
+        held = in_polygon(regions.corners[regions.first[k] : regions.first[k + 1]], x, y)
     return held
 
 
