@@ -29,7 +29,7 @@ FORGET = 60.0
 RETELL = 10.0
 """A region that an agent noticed itself is told again so often, since words get lost [s]."""
 
-_GATE = 3.03  # standard deviations within which two places are one carrier's: 99 % in the plane
+_GATE = 4.29  # standard deviations within which two places are one's: all but 1 in 10 000
 _CLOCK_TOLERANCE = 1e-3  # [s]
 
 _Key = tuple[float, int, float, float]
@@ -160,8 +160,9 @@ class KnownDangers:
     -----
     A carrier noticed at :math:`t_0` with covariance :math:`P` has
     :math:`P + \frac12 v^2 (t - t_0)^2 I` at :math:`t`: the second moment of driving off at speed
-    v in an unknown direction. What is noticed no farther off than it can have driven, but for 3.03
-    standard deviations of the two places (99 %), is the same carrier, and they are fused (Kalman).
+    v in an unknown direction. What is noticed no farther off than it can have driven, but for 4.29
+    standard deviations of the two places, is the same carrier, and they are fused (Kalman). A
+    narrower gate would make a carrier of every hundredth measurement, and keep it for a minute.
     What is older than the news of its carrier changes nothing, and neither does a copy. Of one
     look, what one aircraft noticed at one time, each belongs to another carrier.
 
