@@ -14,7 +14,8 @@ from staniel.datatypes.risk import CarriedThreat, RiskConfig, RiskRegion
 from staniel.datatypes.threats import NO_THREATS, Carrier, Threats
 from staniel.errors import StanielError
 from staniel.guidance import NO_DANGERS, Dangers, KnownDangers
-from staniel.guidance.dangers import FORGET, RETELL
+from staniel.guidance.carriers import FORGET
+from staniel.guidance.dangers import RETELL
 from staniel.world import Hazards
 
 BAN = RiskRegion(kind="no-fly", polygon=((0, 0), (100, 0), (100, 100)), briefed=False)
