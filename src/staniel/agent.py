@@ -16,9 +16,9 @@ from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstim
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyLine
 from staniel.datatypes.equipment import Airframe, Camera
-from staniel.datatypes.message import Heartbeat, Message, Point, Report
-from staniel.datatypes.risk import RiskRegion
-from staniel.guidance import GuidanceConfig, Pursuit, loiter, pursuit_policy_named
+from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
+from staniel.datatypes.risk import CarriedThreat, RiskRegion
+from staniel.guidance import GuidanceConfig, KnownDangers, Pursuit, loiter, pursuit_policy_named
 from staniel.kernels.dubins import lengths
 from staniel.tracking import Tracker, TrackingConfig
 
@@ -27,7 +27,11 @@ __all__ = ["Agent", "Briefing"]
 
 @dataclass(frozen=True, slots=True)
 class Briefing:
-    """What every agent of a team is told before the start."""
+    """What every agent of a team is told before the start.
+
+    Of dangers it is told of `risk`, some regions, and of `carried`: that vehicles carry a threat of
+    this radius and rate, but not which ones do.
+    """
 
     chart: City
     clock: Clock
@@ -37,6 +41,7 @@ class Briefing:
     cooperation: CooperationConfig
     guidance: GuidanceConfig
     risk: tuple[RiskRegion, ...] = ()
+    carried: CarriedThreat | None = None
 
 
 class Agent:
@@ -49,6 +54,13 @@ class Agent:
     briefing : Briefing
     rng : numpy.random.Generator
         Its own.
+
+    Attributes
+    ----------
+    belief : Belief
+        What it holds true and does, as of the last step.
+    dangers : KnownDangers
+        What it was told and noticed of threats and no-fly regions.
     """
 
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
@@ -66,6 +78,9 @@ class Agent:
         )
         self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
         self._lookahead = briefing.guidance.prediction_steps * clock.decision_step
+        self.dangers = KnownDangers(
+            briefing.risk, briefing.carried, speed=briefing.tracking.max_speed
+        )
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
         self.belief = Belief((), "search", None, (0.0, 0.0))
@@ -88,6 +103,8 @@ class Agent:
             To be broadcast; heard in the next step at the earliest.
         """
         time, pose = percept.time, percept.pose
+        told = [message.threats for message in inbox if isinstance(message, Warn)]
+        news = self.dangers.step(time, percept.threats, told)
         tracks = self._track(percept, inbox)
         outbox = self._allocate(percept, tracks, inbox)
         command, role, goal = self._fly(time, pose, inbox, outbox)
@@ -95,6 +112,8 @@ class Agent:
             outbox.append(
                 Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
             )
+        if news:
+            outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
         outbox.append(self._allocation.heartbeat(role, goal))
         held = self._allocation.holding
         self.belief = Belief(self._tracker.estimates, role, None if held is None else held.id, goal)
@@ -190,6 +209,7 @@ class Agent:
             camera=briefing.camera,
             chart=briefing.chart,
             config=briefing.guidance,
+            dangers=self.dangers.at(time, self._tracker.estimates),
         )
 
     def _track_named(self, name: TrackId) -> TrackEstimate | None:

@@ -13,7 +13,7 @@ from staniel.datatypes.command import Command, FlyBanks
 from staniel.datatypes.message import Message
 from staniel.datatypes.truth import FLYING, Truth
 from staniel.record import Frame
-from staniel.world import Lidars, MixedCameras, Radio, World, impair
+from staniel.world import Lidars, MixedCameras, Radio, ThreatSensors, World, impair
 
 __all__ = ["Mission"]
 
@@ -41,6 +41,8 @@ class Mission:
         Decision steps until the end.
     lidars : Lidars, optional
         What each aircraft measures of the walls at its height.
+    threat_sensors : ThreatSensors, optional
+        What each aircraft notices of dangers that nobody briefed it on.
     """
 
     world: World
@@ -50,6 +52,7 @@ class Mission:
     start: Truth
     ticks: int
     lidars: Lidars | None = None
+    threat_sensors: ThreatSensors | None = None
 
     def frames(self) -> Iterator[Frame]:
         """Fly the mission, a frame a tick; the first is the start itself, before anything moved."""
@@ -62,6 +65,9 @@ class Mission:
             percepts, origins = self.cameras.sense(truth)
             if self.lidars is not None:
                 percepts = self.lidars.sense(truth, percepts)
+            noticed: list[tuple[int, ...]] = []
+            if self.threat_sensors is not None:
+                percepts, noticed = self.threat_sensors.sense(truth, percepts)
             percepts, origins = impair(percepts, origins, truth)
             inboxes, deliveries = self.radio.deliver(outboxes, truth)
             flying = truth.condition[:, FLYING].tolist()
@@ -74,4 +80,4 @@ class Mission:
                 commands.append(command)
                 outboxes.append(outbox)
                 beliefs.append(agent.belief if flies else _NO_BELIEF)
-            yield Frame(truth, percepts, origins, deliveries, commands, beliefs)
+            yield Frame(truth, percepts, origins, deliveries, commands, beliefs, noticed)

@@ -22,6 +22,7 @@ __all__ = [
     "DECISION_DTYPE",
     "MESSAGE_DTYPE",
     "SIGHTING_DTYPE",
+    "THREAT_DTYPE",
     "TRACK_DTYPE",
     "Frame",
     "Record",
@@ -49,6 +50,9 @@ class Frame:
         Decided in this tick, one an aircraft.
     beliefs : sequence of Belief
         After this tick, one an aircraft.
+    noticed : sequence of tuple of int
+        Per percept and region that its threat sensor noticed the region's number in the scenario,
+        then per carrier the vehicle; empty where there are no sensors.
     """
 
     truth: Truth
@@ -57,6 +61,7 @@ class Frame:
     deliveries: Sequence[Delivery]
     commands: Sequence[Command]
     beliefs: Sequence[Belief]
+    noticed: Sequence[tuple[int, ...]] = ()
 
 
 def _columns(text: str) -> np.dtype[np.void]:
@@ -75,6 +80,7 @@ MESSAGE_DTYPE = _columns(
 COMMAND_DTYPE = _columns(
     "time:f8 agent:i4 kind:U8 ax:f8 ay:f8 bx:f8 by:f8 radius:f8 turn:i4 speed:f8 altitude:f8"
 )
+THREAT_DTYPE = _columns("time:f8 agent:i4 kind:U8 origin:i4 x:f8 y:f8 cxx:f8 cxy:f8 cyy:f8")
 _SAME = 1e-6  # instants this near to each other are one [s]
 
 DECISION_DTYPE = _columns("time:f8 agent:i4 role:U8 target:U16 goal_x:f8 goal_y:f8")
@@ -112,6 +118,10 @@ class Record:
         Not given: nominal throughout.
     wind : (n, n_aircraft, 2) float array
         Not given: calm.
+    threats : structured array
+        What threat sensors noticed, in the order of time; not given: nothing. `kind` is ``region``
+        or ``carrier``, `origin` the region's number in the scenario or the vehicle; a region has
+        NaN for the rest.
     """
 
     scenario: Mapping[str, Any]
@@ -134,6 +144,7 @@ class Record:
         default_factory=lambda: np.zeros((0, 0, len(CONDITION_COLUMNS)))
     )
     wind: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 2)))
+    threats: NDArray[np.void] = field(default_factory=lambda: np.zeros(0, dtype=THREAT_DTYPE))
 
     def __post_init__(self) -> None:
         ticks, count = self.aircraft.shape[:2]

@@ -12,11 +12,18 @@ from staniel.recording import Recorder
 from staniel.scenario import build_city, load_scenario
 from staniel.scenario.assemble import assemble, kernels_of
 
+HIDDEN = {"kind": "no-fly", "center": [300.0, 300.0], "radius": 90.0, "briefed": False}
+DANGERS = {
+    "regions": [HIDDEN],
+    "carried": {"radius": 120.0, "rate": 0.1, "briefed": True},
+    "sensor": {"range": 150.0, "needs_sight": True},
+}
 EXTRAS = {
     "plain": {},
     "gusts": {"wind": {"gusts": True}},
     "lidar": {"lidar": {"mount": "scanner"}},
     "gimbal": {"camera": {"mount": "gimbal"}},
+    "threats": {"risk": DANGERS},
 }
 
 

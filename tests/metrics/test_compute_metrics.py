@@ -22,6 +22,7 @@ from handmade import (
 
 from staniel.city import City
 from staniel.metrics import compute_metrics, team_picture
+from staniel.record import THREAT_DTYPE
 
 
 def compute(**parts):
@@ -304,6 +305,27 @@ def test_building_strikes_are_counted_once_each_and_not_over_the_roof():
         city=city,
     )
     assert [a["building_strikes"] for a in metrics["aircraft"]] == [2, 0, 0, 1]
+
+
+def test_unbriefed_regions_are_noticed_first_by_anybody():
+    ban = {"kind": "no-fly", "center": [0.0, 0.0], "radius": 9.0}
+    hidden = {**ban, "briefed": False}
+    threats = np.zeros(4, dtype=THREAT_DTYPE)
+    threats["time"] = (2.0, 3.0, 3.0, 4.0)
+    threats["agent"] = (1, 0, 1, 0)
+    threats["kind"] = ("carrier", "region", "region", "region")
+    threats["origin"] = (3, 1, 1, 1)  # a vehicle 3 is not the region 3
+    record = make_record(seconds=4, aircraft=[hover(0, 0), hover(9, 9)], vehicles=[])
+    assert compute_metrics(record)["team"]["risk_noticed"] == []
+    record = dataclasses.replace(
+        record,
+        scenario={**record.scenario, "risk": {"regions": [ban, hidden, ban, hidden]}},
+        threats=threats,
+    )
+    assert compute_metrics(record)["team"]["risk_noticed"] == [
+        {"region": 1, "time": 3.0},
+        {"region": 3, "time": None},
+    ]
 
 
 def test_empty_runs():

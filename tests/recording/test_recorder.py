@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from mcap.reader import make_reader
 from staniel.city import City
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.message import Award, Heartbeat, Report
+from staniel.datatypes.risk import RiskRegion
+from staniel.datatypes.threats import Carrier, Threats
 from staniel.errors import OutputError
 from staniel.recording import Recorder, read_record
 from staniel.recording.encode import FineSteps
@@ -242,6 +245,29 @@ def test_every_message_is_what_its_schema_says(path):
             conforms(json.loads(message.data), json.loads(schema.data), channel.topic)
             checked.add(channel.topic)
     assert checked == set(SCHEMAS) - set(OPTIONAL_TOPICS)
+
+
+def test_threats_are_written_as_their_schema_says_and_only_when_there_are_any(
+    tmp_path, city, frames
+):
+    region = RiskRegion(kind="no-fly", center=(0.0, 0.0), radius=9.0, briefed=False)
+    carrier = Carrier(2.0, [1.23456, -2.0], [[4.0, 1.0], [1.0, 9.0]], 60.0, 0.5, reporter=1)
+    percepts = list(frames[1].percepts)
+    percepts[1] = replace(percepts[1], threats=Threats((region,), (carrier,)))
+    noticed = [(), (5, 2), (), ()]
+    file = record(
+        tmp_path / "threats.mcap",
+        city,
+        [frames[0], replace(frames[1], percepts=percepts, noticed=noticed), frames[2]],
+    )
+    with file.open("rb") as stream:
+        ((schema, _, message),) = make_reader(stream).iter_messages("/staniel/threats")
+    conforms(json.loads(message.data), json.loads(schema.data))
+    assert message.sequence == frames[1].truth.tick
+    first, second = read_record(file).threats.tolist()
+    assert first[:4] == (frames[1].truth.time, 1, "region", 5)
+    assert np.isnan(first[4:]).all()
+    assert second == (2.0, 1, "carrier", 2, 1.235, -2.0, 4.0, 1.0, 9.0)
 
 
 def test_the_scene_shows_each_machine_where_it_is(path, frames):

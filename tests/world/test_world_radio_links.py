@@ -12,7 +12,9 @@ from scipy import stats
 from staniel.city import City
 from staniel.datatypes.belief import Pose, Sighting, TrackId
 from staniel.datatypes.equipment import Partition, RadioSet
-from staniel.datatypes.message import Award, Bid, Heartbeat, Message, Release, Report
+from staniel.datatypes.message import Award, Bid, Heartbeat, Message, Release, Report, Warn
+from staniel.datatypes.risk import RiskRegion
+from staniel.datatypes.threats import Carrier, Threats
 from staniel.datatypes.truth import Truth, nominal
 from staniel.datatypes.wire import HEAD, wire_size
 from staniel.errors import ScenarioError
@@ -127,6 +129,11 @@ def test_sizes_on_the_air():
     assert wire_size(Bid(0, 1, 0.0, target=name, auctioneer=1, cost=1.0)) == 36
     assert wire_size(Award(0, 1, 0.0, target=name, position=(0, 0), winner=1, cost=1.0)) == 44
     assert wire_size(Release(0, 1, 0.0, target=name, position=(0, 0), lost=True)) == 39
+    disc = RiskRegion(kind="threat", center=(0.0, 0.0), radius=9.0, rate=1.0)
+    ban = RiskRegion(kind="no-fly", polygon=((0, 0), (9, 0), (9, 9), (0, 9)))
+    carrier = Carrier(0.0, [0.0, 0.0], np.eye(2), 60.0, 0.5)
+    warning = Warn(0, 1, 0.0, threats=Threats((disc, ban), (carrier,) * 2))
+    assert wire_size(warning) == 16 + (15 + 12) + (15 + 4 * 8) + 2 * 38
 
 
 def test_bandwidth_sends_one_after_the_other():

@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from staniel.datatypes.checks import checked_covariance, checked_floats
 from staniel.datatypes.lidar import LidarScan
+from staniel.datatypes.threats import NO_THREATS, Threats
 
 __all__ = ["Belief", "Percept", "Pose", "Sighting", "TrackEstimate", "TrackId"]
 
@@ -70,15 +72,10 @@ class Sighting:
     pose: Pose | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", _floats(self.position, (2,), "position"))
-        covariance = _floats(self.covariance, (2, 2), "covariance")
+        position = checked_floats(self.position, (2,), "Sighting.position")
+        covariance = checked_covariance(self.covariance, "Sighting.covariance")
+        object.__setattr__(self, "position", position)
         object.__setattr__(self, "covariance", covariance)
-        a, b, c, d = covariance.ravel().tolist()
-        if abs(b - c) > 1e-9 * (abs(a) + abs(d)) or a <= 0.0 or a * d - b * c <= 0.0:
-            raise ValueError(
-                f"Sighting.covariance = {covariance.tolist()}: "
-                "expected a symmetric, positive definite matrix"
-            )
         if not math.isfinite(self.time):
             raise ValueError(f"Sighting.time = {self.time}: expected a finite number of seconds")
 
@@ -98,15 +95,6 @@ class Sighting:
             self.position.tobytes(),
             self.covariance.tobytes(),
         )
-
-
-def _floats(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.float64]:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape != shape:
-        raise ValueError(f"Sighting.{name} has shape {array.shape}: expected {shape}")
-    if not all(map(math.isfinite, array.ravel().tolist())):
-        raise ValueError(f"Sighting.{name} = {array.tolist()}: expected finite numbers")
-    return array
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,12 +141,13 @@ class TrackEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """What one aircraft perceives in one tick: its own navigation, its camera and its lidar."""
+    """What one aircraft perceives in one tick: navigation, camera, lidar and threat sensor."""
 
     time: float
     pose: Pose
     sightings: tuple[Sighting, ...]
     lidar: LidarScan | None = None
+    threats: Threats = NO_THREATS
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ first two a receiver recognises a copy. The auction's words are those of thesis 
 from dataclasses import dataclass
 
 from staniel.datatypes.belief import Pose, Sighting, TrackId
+from staniel.datatypes.threats import Threats
 
 __all__ = [
     "Announce",
@@ -19,6 +20,7 @@ __all__ = [
     "Release",
     "Report",
     "Revoke",
+    "Warn",
 ]
 
 Point = tuple[float, float]
@@ -55,6 +57,13 @@ class Report(Message):
     """What my camera saw."""
 
     sightings: tuple[Sighting, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Warn(Message):
+    """There is danger: what my threat sensor noticed."""
+
+    threats: Threats
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,13 +1,16 @@
 """Where it is dangerous or forbidden to fly: the words of scenarios and of briefings."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
+import numpy as np
 import shapely
 from pydantic import Field, model_validator
 
 from staniel.datatypes.config import Config
+from staniel.kernels.risk import Regions
 
-__all__ = ["CarriedThreat", "RiskConfig", "RiskRegion"]
+__all__ = ["CarriedThreat", "RiskConfig", "RiskRegion", "ThreatSensor", "region_arrays"]
 
 MAX_REGIONS = 1000
 MAX_POINTS = 10_000
@@ -64,6 +67,19 @@ class CarriedThreat(Config):
     vehicles: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(
         None, max_length=10_000, description="who carries it, by id; not set: all"
     )
+    briefed: bool = Field(
+        False, description="the agents are told that vehicles carry it; never which"
+    )
+
+    @property
+    def active(self) -> bool:
+        """Whether it exposes anybody."""
+        return self.radius > 0.0 and self.rate > 0.0
+
+    @property
+    def briefing(self) -> "CarriedThreat | None":
+        """What the agents are told of it: how far and how much, never who carries it."""
+        return self.model_copy(update={"vehicles": None}) if self.briefed and self.active else None
 
     @model_validator(mode="after")
     def _each_once(self) -> Self:
@@ -72,13 +88,27 @@ class CarriedThreat(Config):
         return self
 
 
+class ThreatSensor(Config):
+    """What each aircraft has to notice dangers that it was not told of: a warning receiver."""
+
+    range: float = Field(0.0, ge=0.0, le=1e5, description="slant range that it reaches [m]; 0: off")
+    probability: float = Field(
+        1.0, gt=0.0, le=1.0, description="of noticing each danger in range, per decision step"
+    )
+    noise: float = Field(
+        10.0, gt=0.0, le=1e4, description="1 sigma per axis of where a vehicle carries it [m]"
+    )
+    needs_sight: bool = Field(False, description="a building in between hides the danger")
+
+
 class RiskConfig(Config):
-    """Threats and no-fly regions, and threats that vehicles carry."""
+    """Threats and no-fly regions, threats that vehicles carry, and what notices them."""
 
     regions: tuple[RiskRegion, ...] = Field(
         (), description="each a table: kind, shape, rate, heights, briefed"
     )
     carried: CarriedThreat = CarriedThreat()
+    sensor: ThreatSensor = ThreatSensor()
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
@@ -95,5 +125,34 @@ class RiskConfig(Config):
 
     @property
     def briefed(self) -> tuple[RiskRegion, ...]:
-        """What the agents are told before the start: never what vehicles carry."""
+        """Of which regions the agents are told before the start."""
         return tuple(region for region in self.regions if region.briefed)
+
+
+def region_arrays(regions: Sequence[RiskRegion]) -> Regions:
+    """Regions as kernels take them.
+
+    Parameters
+    ----------
+    regions : sequence of RiskRegion
+
+    Returns
+    -------
+    Regions
+    """
+    box, disc = np.zeros((len(regions), 6)), np.zeros((len(regions), 3))
+    first = np.zeros(len(regions) + 1, dtype=np.int64)
+    corners: list[Point] = []
+    for k, region in enumerate(regions):
+        if region.polygon is not None:
+            corners += region.polygon
+            low, high = np.min(region.polygon, axis=0), np.max(region.polygon, axis=0)
+        else:
+            # The configuration has seen to it that what is no polygon is a disc.
+            center, radius = np.array(region.center), region.radius or 0.0
+            low, high = center - radius, center + radius
+            disc[k] = (*center, radius)
+        ceiling = np.inf if region.ceiling is None else region.ceiling
+        box[k] = (low[0], high[0], low[1], high[1], region.floor, ceiling)
+        first[k + 1] = len(corners)
+    return Regions(box, disc, first, np.array(corners, dtype=np.float64).reshape(-1, 2))

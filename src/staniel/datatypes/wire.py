@@ -11,6 +11,9 @@ point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
 heartbeat      head, pose, role 1, goal, track name, point, cost
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
+warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
+               each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,
+               reporter 2, radius and rate 4 each
 announce       head, track name, point, course 4, cost
 bid            head, track name, auctioneer 2, cost
 award          head, track name, point, winner 2, cost
@@ -30,9 +33,11 @@ from staniel.datatypes.message import (
     Release,
     Report,
     Revoke,
+    Warn,
 )
+from staniel.datatypes.risk import RiskRegion
 
-__all__ = ["HEAD", "SIGHTING", "wire_size"]
+__all__ = ["CARRIER", "HEAD", "SIGHTING", "wire_size"]
 
 HEAD: Final = 16
 """What every message has [byte]."""
@@ -40,11 +45,15 @@ HEAD: Final = 16
 SIGHTING: Final = 54
 """What each sighting adds to a report [byte]."""
 
-_NAME, _POINT, _COST, _POSE = 14, 8, 4, 24
+CARRIER: Final = 38
+"""What each carrier adds to a warning [byte]."""
+
+_NAME, _POINT, _COST, _POSE, _REGION, _DISC = 14, 8, 4, 24, 15, 12
 
 _SIZES: Final[dict[type[Message], int]] = {
     Heartbeat: HEAD + _POSE + 1 + _POINT + _NAME + _POINT + _COST,
     Report: HEAD,
+    Warn: HEAD,
     Announce: HEAD + _NAME + _POINT + 4 + _COST,
     Bid: HEAD + _NAME + 2 + _COST,
     Award: HEAD + _NAME + _POINT + 2 + _COST,
@@ -64,4 +73,11 @@ def wire_size(message: Message) -> int:
     size = _SIZES.get(type(message), HEAD)
     if isinstance(message, Report):
         size += SIGHTING * len(message.sightings)
+    elif isinstance(message, Warn):
+        size += CARRIER * len(message.threats.carriers)
+        size += sum(map(_region_size, message.threats.regions))
     return size
+
+
+def _region_size(region: RiskRegion) -> int:
+    return _REGION + (_DISC if region.polygon is None else _POINT * len(region.polygon))

@@ -1,6 +1,7 @@
-"""How to fly it: loiters and pursuit policies."""
+"""How to fly it: loiters and pursuit policies, and the dangers known on the way."""
 
 from staniel.guidance.config import GuidanceConfig
+from staniel.guidance.dangers import NO_DANGERS, Dangers, KnownDangers
 from staniel.guidance.loiter import loiter
 from staniel.guidance.pursuit import (
     Policy,
@@ -12,7 +13,10 @@ from staniel.guidance.pursuit import (
 )
 
 __all__ = [
+    "NO_DANGERS",
+    "Dangers",
     "GuidanceConfig",
+    "KnownDangers",
     "Policy",
     "Pursuit",
     "carrot",

@@ -20,6 +20,7 @@ from staniel.datatypes.belief import Pose, TrackEstimate
 from staniel.datatypes.command import Command, FlyLine
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.guidance.config import GuidanceConfig
+from staniel.guidance.dangers import NO_DANGERS, Dangers
 from staniel.guidance.loiter import loiter
 
 __all__ = ["Policy", "Pursuit", "carrot", "pursuit_names", "pursuit_policy", "pursuit_policy_named"]
@@ -45,6 +46,9 @@ class Pursuit:
     chart : City
         The map that the agent holds.
     config : GuidanceConfig
+    dangers : Dangers
+        What the agent knows of threats and no-fly regions: the expected exposure rate at a place,
+        and whether it is forbidden to be there.
     """
 
     time: float
@@ -56,6 +60,7 @@ class Pursuit:
     camera: Camera
     chart: City
     config: GuidanceConfig
+    dangers: Dangers = NO_DANGERS
 
 
 Policy = Callable[[Pursuit], Command]

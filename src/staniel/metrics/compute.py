@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from staniel.metrics.dangers import danger_metrics
+from staniel.metrics.dangers import danger_metrics, noticed_metrics
 from staniel.metrics.flown import aircraft_metrics
 from staniel.metrics.following import follow
 from staniel.metrics.links import sender_metrics
@@ -49,7 +49,10 @@ def compute_metrics(record: Record) -> dict[str, Any]:
                 strict=True,
             )
         ],
-        "team": team_metrics(record, following, targets),
+        "team": {
+            **team_metrics(record, following, targets),
+            "risk_noticed": noticed_metrics(record),
+        },
     }
     rounded: dict[str, Any] = _rounded(metrics)
     return rounded

@@ -1,4 +1,4 @@
-"""What threats and no-fly regions did to each aircraft, from the fine samples of a record."""
+"""What threats and no-fly regions did to each aircraft, and when they were noticed."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from staniel.metrics.visible import condition_samples, sample_step
 from staniel.record import Record
 from staniel.world.risk import Hazards
 
-__all__ = ["danger_metrics"]
+__all__ = ["danger_metrics", "noticed_metrics"]
 
 
 def danger_metrics(record: Record) -> list[dict[str, Any]]:
@@ -38,4 +38,32 @@ def danger_metrics(record: Record) -> list[dict[str, Any]]:
     return [
         {"risk_exposure": risk, "no_fly_seconds": seconds, "no_fly_violations": count}
         for risk, seconds, count in zip(*columns, strict=True)
+    ]
+
+
+def noticed_metrics(record: Record) -> list[dict[str, Any]]:
+    """When each region that nobody was briefed on was first noticed, by any threat sensor.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    list of dict
+        With ``region``, its number in the scenario, and ``time`` [s], None where never.
+
+    Raises
+    ------
+    RecordError
+        The record's scenario has a risk section that no scenario can have.
+    """
+    noticed = record.threats[record.threats["kind"] == "region"]
+    first: dict[int, float] = {}
+    for origin, time in zip(noticed["origin"].tolist(), noticed["time"].tolist(), strict=True):
+        first[origin] = min(time, first.get(origin, time))
+    return [
+        {"region": number, "time": first.get(number)}
+        for number, region in enumerate(record.risk.regions)
+        if not region.briefed
     ]

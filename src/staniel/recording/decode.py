@@ -23,6 +23,7 @@ from staniel.record import (
     DECISION_DTYPE,
     MESSAGE_DTYPE,
     SIGHTING_DTYPE,
+    THREAT_DTYPE,
     TRACK_DTYPE,
     Record,
 )
@@ -91,6 +92,7 @@ def decode(contents: Contents) -> Record:
         links=links.counted(poses["aircraft"].shape[1]),
         condition=condition,
         wind=wind,
+        threats=_table(ticks, "threats", THREAT_DTYPE, _threat, ("x", "y", "cxx", "cxy", "cyy")),
     )
 
 
@@ -153,7 +155,8 @@ def _entries(
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     topic = f"/staniel/{kind}"
     for tick, texts in ticks.items():
-        yield tick, _json(texts[topic], f"{topic}, tick {tick}")
+        if topic in texts:  # A whole tick lacks none but what it may lack.
+            yield tick, _json(texts[topic], f"{topic}, tick {tick}")
 
 
 def _poses(truth: Sequence[Mapping[str, Any]]) -> dict[str, Floats]:
@@ -276,6 +279,13 @@ def _track(_: float, item: Mapping[str, Any]) -> Row:
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
+
+
+def _threat(_: float, item: Mapping[str, Any]) -> Row:
+    return (
+        item["time"], item["agent"], _text(item["kind"], 8), item["origin"],
+        *(_or_nan(item[name]) for name in ("x", "y", "cxx", "cxy", "cyy")),
+    )  # fmt: skip
 
 
 def _message(_: float, item: Mapping[str, Any]) -> Row:

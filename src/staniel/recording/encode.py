@@ -44,6 +44,14 @@ _VEHICLE = '{"id":%d,"x":%%.3f,"y":%%.3f,"heading":%%.4f,"speed":%%.3f}'
 _SIGHTING = (
     '{"time":%s,"reporter":%d,"x":%.3f,"y":%.3f,"cxx":%.6g,"cxy":%.6g,"cyy":%.6g,"origin":%d}'
 )
+_REGION = (
+    '{"time":%s,"agent":%d,"kind":"region","origin":%d,"x":null,"y":null,'
+    '"cxx":null,"cxy":null,"cyy":null}'
+)
+_CARRIER = (
+    '{"time":%s,"agent":%d,"kind":"carrier","origin":%d,"x":%.3f,"y":%.3f,'
+    '"cxx":%.6g,"cxy":%.6g,"cyy":%.6g}'
+)
 _TRACK = (
     '{"agent":%d,"id":"%s","time":%s,"x":%.3f,"y":%.3f,"vx":%.3f,"vy":%.3f,'
     '"cxx":%.6g,"cxy":%.6g,"cyy":%.6g,"existence":%.4f,"last_seen":%s}'
@@ -91,8 +99,8 @@ def encode_tick(frame: Frame, fine: FineSteps) -> list[tuple[str, str]]:
     Returns
     -------
     list of (str, str)
-        Topic and JSON text, one for each of `schemas.TICK_TOPICS`, and the condition of the
-        aircraft where that is not nominal or the wind blows.
+        Topic and JSON text, one for each of `schemas.TICK_TOPICS`; the condition of the aircraft
+        where that is not nominal or the wind blows; the threats where any was noticed.
     """
     head = f'{{"tick":{frame.truth.tick},"time":{_time(frame.truth.time)},'
     rows = {
@@ -110,6 +118,9 @@ def encode_tick(frame: Frame, fine: FineSteps) -> list[tuple[str, str]]:
     if frame.truth.wind.any() or (frame.truth.condition != _NOMINAL).any():
         conditions = ",".join(_conditions(frame.truth))
         texts.append(("/staniel/condition", f'{head}"aircraft":[{conditions}]}}'))
+    if any(frame.noticed):
+        threats = ",".join(_threats(frame.percepts, frame.noticed))
+        texts.append(("/staniel/threats", f'{head}"threats":[{threats}]}}'))
     return texts
 
 
@@ -161,6 +172,19 @@ def _sightings(percepts: Sequence[Percept], origins: Sequence[tuple[int, ...]]) 
             x, y = sighting.position.tolist()
             (cxx, cxy), (_, cyy) = sighting.covariance.tolist()
             rows.append(_SIGHTING % (_time(sighting.time), agent, x, y, cxx, cxy, cyy, origin))
+    return rows
+
+
+def _threats(percepts: Sequence[Percept], noticed: Sequence[tuple[int, ...]]) -> list[str]:
+    rows = []
+    for agent, (percept, origins) in enumerate(zip(percepts, noticed, strict=True)):
+        regions, carriers = percept.threats.regions, percept.threats.carriers
+        now = _time(percept.time)
+        rows += [_REGION % (now, agent, origin) for origin in origins[: len(regions)]]
+        for carrier, origin in zip(carriers, origins[len(regions) :], strict=True):
+            x, y = carrier.position.tolist()
+            (cxx, cxy), (_, cyy) = carrier.covariance.tolist()
+            rows.append(_CARRIER % (_time(carrier.time), agent, origin, x, y, cxx, cxy, cyy))
     return rows
 
 

@@ -102,6 +102,15 @@ _SIGHTING = _object(
     **_COVARIANCE,
     origin=_integer("the vehicle that caused it, -1 for a false alarm"),
 )
+_THREAT = _object(
+    time=_number("[s]"),
+    agent=_integer("whose sensor noticed it"),
+    kind=_string("region or carrier"),
+    origin=_integer("the region's number in the scenario, or the vehicle; no agent knows it"),
+    x=_or_null(_number("east: of a carrier, as measured [m]")),
+    y=_or_null(_number("north [m]")),
+    **{name: _or_null(schema) for name, schema in _COVARIANCE.items()},
+)
 _TRACK = _object(
     agent=_integer("whose belief this is"),
     id=_string("founder-serial"),
@@ -118,7 +127,7 @@ _MESSAGE = _object(
     time=_number("when it was said [s]"),
     sender=_integer("aircraft"),
     sequence=_integer("running number at the sender"),
-    kind=_string("heartbeat, report, announce, bid, award, revoke or release"),
+    kind=_string("heartbeat, report, warn, announce, bid, award, revoke or release"),
     target=_or_null(_string("track, founder-serial")),
     winner=_or_null(_integer("aircraft")),
     cost=_or_null(_number("of pursuing the target; null when none or not finite")),
@@ -228,6 +237,7 @@ SCHEMAS: Final[dict[str, tuple[str, Schema]]] = {
         "staniel.Condition",
         _tick("staniel.Condition", aircraft=_list(_CONDITION)),
     ),
+    "/staniel/threats": ("staniel.Threats", _tick("staniel.Threats", threats=_list(_THREAT))),
     "/scene/city": ("foxglove.SceneUpdate", _SCENE),
     "/scene/team": ("foxglove.SceneUpdate", _SCENE),
 }
@@ -242,7 +252,7 @@ TICK_TOPICS: Final = tuple(
 )
 """The topics that every tick has one message on."""
 
-OPTIONAL_TOPICS: Final = ("/staniel/condition",)
+OPTIONAL_TOPICS: Final = ("/staniel/condition", "/staniel/threats")
 """The topics that have a message in the ticks that need one."""
 
 

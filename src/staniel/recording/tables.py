@@ -66,7 +66,7 @@ def export(
 ) -> list[Path]:
     """Write a record's tables, one file each.
 
-    Truth, sightings, tracks, messages, commands and decisions.
+    Truth, sightings, threats, tracks, messages, commands and decisions.
 
     Parameters
     ----------
@@ -108,6 +108,7 @@ def _tables(record: Record) -> Mapping[str, NDArray[np.void]]:
     return {
         "truth": truth_table(record),
         "sightings": record.sightings,
+        "threats": record.threats,
         "tracks": record.tracks,
         "messages": record.messages,
         "commands": record.commands,

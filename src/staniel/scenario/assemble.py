@@ -9,7 +9,7 @@ from staniel.city import City
 from staniel.errors import ScenarioError
 from staniel.mission import Mission
 from staniel.scenario.model import Scenario
-from staniel.world import Lidars, MixedCameras, Radio, World
+from staniel.world import Lidars, MixedCameras, Radio, ThreatSensors, World
 
 __all__ = ["assemble", "kernels_of"]
 
@@ -36,8 +36,8 @@ def assemble(scenario: Scenario, city: City) -> Mission:
     ScenarioError
         An aircraft or a vehicle has no place in this city, or sightings would come too late.
     """
-    seeds = np.random.SeedSequence(scenario.seed).spawn(5)
-    world_seed, camera_seed, radio_seed, agent_seed, lidar_seed = seeds
+    seeds = np.random.SeedSequence(scenario.seed).spawn(6)
+    world_seed, camera_seed, radio_seed, agent_seed, lidar_seed, threat_seed = seeds
     team, clock = scenario.aircraft, scenario.clock
     cameras, airframes = scenario.cameras, scenario.airframes
     slowest = max(camera.delay for camera in cameras)
@@ -56,6 +56,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         cooperation=scenario.cooperation,
         guidance=scenario.guidance,
         risk=scenario.risk.briefed,
+        carried=scenario.risk.carried.briefing,
     )
     world = World(
         city,
@@ -69,7 +70,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         launch=scenario.launch,
         airframes=airframes,
     )
-    lidar = scenario.lidar
+    lidar, risk = scenario.lidar, scenario.risk
     return Mission(
         world=world,
         cameras=MixedCameras(city, cameras, team.altitude, camera_seed, clock),
@@ -90,15 +91,18 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         start=world.start(),
         ticks=round(scenario.minutes * 60.0 / clock.decision_step),
         lidars=None if lidar.mount == "none" else Lidars(city, lidar, lidar_seed),
+        threat_sensors=ThreatSensors(city, risk, threat_seed) if risk.sensor.range else None,
     )
 
 
 def kernels_of(scenario: Scenario) -> list[str]:
     """Kernel modules that this scenario calls beside those that every mission does."""
+    dangerous = bool(scenario.risk.regions or scenario.risk.carried.radius)
     uses = {
         "gusts": scenario.wind.gusts,
         "lidar": scenario.lidar.mount != "none",
-        "risk": scenario.risk.regions or scenario.risk.carried.radius,
+        "risk": dangerous,
+        "threats": dangerous,
         "roads": scenario.vehicles.kind == "roads",
         "replay": scenario.vehicles.kind == "replay",
     }

@@ -7,6 +7,7 @@ from staniel.world.kinds import MixedCameras
 from staniel.world.lidar import Lidars
 from staniel.world.radio import Radio
 from staniel.world.risk import Exposure, Hazards
+from staniel.world.threats import ThreatSensors
 from staniel.world.world import World
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Lidars",
     "MixedCameras",
     "Radio",
+    "ThreatSensors",
     "Traffic",
     "Wind",
     "World",

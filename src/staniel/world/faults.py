@@ -93,7 +93,7 @@ def impair(
     """What is left of the percepts when cameras are dead and navigation is off.
 
     A dead camera delivers nothing. A navigation that is off shifts the own pose and, since they are
-    mapped from it, the places of all sightings and the scan.
+    mapped from it, the places of all sightings and carriers, and the scan.
 
     Parameters
     ----------
@@ -135,8 +135,15 @@ def _shifted(percept: Percept, east: float, north: float) -> Percept:
             pose=_moved(scan.pose, east, north),
             origins=scan.origins + np.array([east, north]),
         )
+    threats = percept.threats
+    if threats.carriers:
+        carriers = tuple(
+            replace(carrier, position=carrier.position + np.array([east, north]))
+            for carrier in threats.carriers
+        )
+        threats = replace(threats, carriers=carriers)
     pose = _moved(percept.pose, east, north)
-    return replace(percept, pose=pose, sightings=sightings, lidar=scan)
+    return replace(percept, pose=pose, sightings=sightings, lidar=scan, threats=threats)
 
 
 def _moved(pose: Pose, east: float, north: float) -> Pose:

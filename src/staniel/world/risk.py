@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.datatypes.risk import RiskConfig, RiskRegion
-from staniel.kernels.risk import Regions, inside_times, near_times
+from staniel.datatypes.risk import RiskConfig, region_arrays
+from staniel.kernels.risk import inside_times, near_times
 
 __all__ = ["Exposure", "Hazards"]
 
@@ -45,6 +45,7 @@ class Hazards:
     --------
     Ten seconds at 15 m/s across a disc of 30 m, two units of exposure per second inside:
 
+    >>> from staniel.datatypes.risk import RiskRegion
     >>> disc = RiskRegion(kind="threat", center=(75.0, 0.0), radius=30.0, rate=2.0)
     >>> path = np.zeros((2, 1, 6))
     >>> path[1, 0, 0] = 150.0
@@ -54,7 +55,7 @@ class Hazards:
 
     def __init__(self, config: RiskConfig) -> None:
         regions = config.regions
-        self._regions = _flattened(regions)
+        self._regions = region_arrays(regions)
         self._rates = np.array([region.rate or 0.0 for region in regions], dtype=np.float64)
         self._forbidden = np.array([region.kind == "no-fly" for region in regions], dtype=np.bool_)
         self._carried = config.carried
@@ -86,7 +87,7 @@ class Hazards:
             entries = np.zeros((path.shape[1], 0), dtype=np.int64)
         risk = seconds @ self._rates
         carried, count = self._carried, vehicles.shape[1]
-        if carried.radius and carried.rate and count:
+        if carried.active and count:
             who = range(count) if carried.vehicles is None else carried.vehicles
             near = near_times(
                 path,
@@ -99,23 +100,3 @@ class Hazards:
         return Exposure(
             risk, seconds[:, self._forbidden].sum(axis=1), entries[:, self._forbidden].sum(axis=1)
         )
-
-
-def _flattened(regions: tuple[RiskRegion, ...]) -> Regions:
-    """Regions as the kernel takes them."""
-    box, disc = np.zeros((len(regions), 6)), np.zeros((len(regions), 3))
-    first = np.zeros(len(regions) + 1, dtype=np.int64)
-    corners: list[tuple[float, float]] = []
-    for k, region in enumerate(regions):
-        if region.polygon is not None:
-            corners += region.polygon
-            low, high = np.min(region.polygon, axis=0), np.max(region.polygon, axis=0)
-        else:
-            # The configuration has seen to it that what is no polygon is a disc.
-            center, radius = np.array(region.center), region.radius or 0.0
-            low, high = center - radius, center + radius
-            disc[k] = (*center, radius)
-        ceiling = np.inf if region.ceiling is None else region.ceiling
-        box[k] = (low[0], high[0], low[1], high[1], region.floor, ceiling)
-        first[k + 1] = len(corners)
-    return Regions(box, disc, first, np.array(corners, dtype=np.float64).reshape(-1, 2))
