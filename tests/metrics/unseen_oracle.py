@@ -79,8 +79,9 @@ def _believed(record):
 
 
 def _look(camera, houses, city, pose, place):
-    """What a belly camera at `pose` lacks to see the vehicle, or "seen"."""
+    """What a camera in the belly, or held level, lacks to see the vehicle, or "seen"."""
     x, y, z, heading, bank, _ = pose
+    bank = 0.0 if camera.mount == "nadir" else bank
     turn = np.array([[math.cos(heading), -math.sin(heading), 0.0],
                      [math.sin(heading), math.cos(heading), 0.0],
                      [0.0, 0.0, 1.0]])  # fmt: skip
