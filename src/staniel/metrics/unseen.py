@@ -216,7 +216,7 @@ def _reports(record: Record, shape: tuple[int, int]) -> tuple[Indices, Indices, 
         return reports, np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
     rows = np.flatnonzero((messages["kind"] == "report") & _among(messages["sender"], shape[1]))
     reports[_instants(record, messages["time"][rows]), messages["sender"][rows]] = rows
-    heard, receivers = record.receptions.T.astype(np.int64)
+    heard, receivers = (record.receptions[:, column].astype(np.int64) for column in (0, 1))
     return reports, np.searchsorted(heard, np.arange(len(messages) + 1)), receivers
 
 
