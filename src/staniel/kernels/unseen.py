@@ -1,5 +1,6 @@
 """Why a vehicle goes unwatched: who is assigned to it, what keeps it from sight, who was told."""
 
+import math
 from typing import Final
 
 import numpy as np
@@ -41,7 +42,7 @@ MISSED_DETECTION: Final = 6
 MESSAGE_LOST: Final = 7
 TRACK_LOST: Final = 8
 
-_SEEN: Final = 6  # above all that may hinder an aircraft, and below nothing
+_SEEN: Final = BUILDING + 1  # lacks less than what any hindrance leaves
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,7 +153,7 @@ def hindrances(
         assigned to none. The higher, the less was lacking.
     """
     hindered = np.zeros(assigned.shape, dtype=np.int8)
-    cosine = np.cos(half_aperture)
+    cosine = math.cos(half_aperture)
     for t in range(assigned.shape[0]):
         axes = camera_axes(aircraft[t], looks[t], mount)
         for i in range(assigned.shape[1]):
@@ -162,7 +163,7 @@ def hindrances(
             x, y, z = aircraft[t, i, 0], aircraft[t, i, 1], aircraft[t, i, 2]
             px, py = vehicles[t, k, 0], vehicles[t, k, 1]
             dx, dy, dz = px - x, py - y, height - z
-            if not in_range(np.sqrt(dx * dx + dy * dy + dz * dz), reach):
+            if not in_range(math.sqrt(dx * dx + dy * dy + dz * dz), reach):
                 hindered[t, i] = OUT_OF_RANGE
             elif not in_cone(dx, dy, dz, axes[i, 0], axes[i, 1], axes[i, 2], cosine, reach):
                 hindered[t, i] = OUTSIDE_FOOTPRINT
