@@ -114,6 +114,9 @@ class Record:
     links : (n_aircraft, n_aircraft) int array
         How many broadcasts of each aircraft (row) each other one (column) heard; (0, 0) when not
         known.
+    receptions : (r, 2) int array or None
+        Who heard what: a row of `messages` and an aircraft for each reception, in the order of the
+        rows. None when not known.
     condition : (n, n_aircraft, 8) float array
         Not given: nominal throughout.
     wind : (n, n_aircraft, 2) float array
@@ -140,6 +143,7 @@ class Record:
     decisions: NDArray[np.void]
     complete: bool
     links: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    receptions: NDArray[np.int32] | None = None
     condition: NDArray[np.float64] = field(
         default_factory=lambda: np.zeros((0, 0, len(CONDITION_COLUMNS)))
     )

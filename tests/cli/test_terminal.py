@@ -87,3 +87,18 @@ def test_the_note_on_compiling_waits_for_a_reason(monkeypatch, delay, noted):
 def test_times_of_day_and_unknown_times():
     assert [terminal._clock(t) for t in (0.0, 59.6, 3601.0)] == ["0:00", "1:00", "60:01"]
     assert terminal._clock(float("nan")) == "--:--"
+
+
+def team(watched, **seconds):
+    causes = {"nobody_assigned": 0.0, "outside_footprint": 0.0, "building": 0.0, "track_lost": 0.0}
+    return {"watched": watched, "unwatched": causes | seconds}
+
+
+def test_the_three_largest_causes_of_what_was_unwatched_in_one_line():
+    several = team(50.0, building=30.0, nobody_assigned=12.0, track_lost=6.0, outside_footprint=2.0)
+    said = terminal._reasons(several)
+    assert said == "unwatched 50%: building 30%, nobody assigned 12%, track lost 6%"
+    longest = {"outside_footprint": 331.0, "missed_detection": 331.0, "nobody_assigned": 331.0}
+    assert len(terminal._reasons(team(7.0, **longest))) <= 80
+    assert terminal._reasons(team(99.7, building=0.3)) == "unwatched 0%"
+    assert terminal._reasons(team(0.0)) == terminal._reasons({}) == ""

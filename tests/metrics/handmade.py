@@ -71,6 +71,9 @@ def make_record(
     decisions=(),
     fine=0.2,
     complete=True,
+    camera=None,
+    receptions=None,
+    condition=None,
 ):
     """A record from poses as functions of time.
 
@@ -80,7 +83,14 @@ def make_record(
         Decision instants are 0, 1, ..., seconds; fine ones every `fine` from 0.
     aircraft, vehicles : list of callables
         From the time to a row of six and of four numbers.
+    camera : dict, optional
+        What is other than in `SCENARIO`.
+    receptions : list of (int, int), optional
+        Number of the message, aircraft that heard it.
+    condition : callable, optional
+        From the time to a row of eight numbers for each aircraft.
     """
+    scenario = {**SCENARIO, "camera": {**SCENARIO["camera"], **(camera or {})}}
     times = np.arange(seconds + 1, dtype=float)
     fine_times = fine * np.arange(round(seconds / fine) + 1)
 
@@ -89,7 +99,7 @@ def make_record(
         return np.array(table, dtype=float).reshape(len(instants), len(movers), columns)
 
     return Record(
-        scenario=SCENARIO,
+        scenario=scenario,
         version="0.0.0",
         city=city or City.open((1000.0, 1000.0)),
         times=times,
@@ -104,6 +114,8 @@ def make_record(
         commands=rows(COMMAND_DTYPE, ()),
         decisions=rows(DECISION_DTYPE, decisions),
         complete=complete,
+        receptions=None if receptions is None else np.reshape(receptions, (-1, 2)).astype(np.int32),
+        **({} if condition is None else {"condition": np.array([condition(t) for t in times])}),
     )
 
 

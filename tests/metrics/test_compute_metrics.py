@@ -84,6 +84,8 @@ def test_never_found_is_none_and_counts_as_nothing_in_the_team():
     assert found["tracked_fraction"] == found["visible_fraction"] == 1.0
     assert missed.pop("id") == 1
     assert missed.pop("identity_switches") == 0
+    assert missed.pop("watched") == 0.0
+    assert missed.pop("unwatched")["nobody_assigned"] == 5.0
     assert set(missed.values()) == {None}
     assert metrics["team"]["visible_fraction"] == metrics["team"]["tracked_fraction"] == 0.5
     assert metrics["team"]["gospa_mean"] == pytest.approx(math.sqrt(200.0), abs=1e-6)

@@ -55,3 +55,16 @@ def test_it_is_the_same_run_again(poor, tmp_path):
     again = staniel.fly(load_scenario("downtown", minutes=3.0, radio=POOR), out=tmp_path / "run")
     metrics = {key: value for key, value in run.metrics.items() if key != "real_time_factor"}
     assert metrics == {k: v for k, v in again.metrics.items() if k != "real_time_factor"}
+
+
+def test_the_receptions_name_everyone_who_heard(poor):
+    _, record = poor
+    rows, hearers = record.receptions.T
+    assert (np.diff(rows) >= 0).all()
+    assert np.array_equal(
+        np.bincount(rows, minlength=len(record.messages)), record.messages["heard"]
+    )
+    assert (record.messages["sender"][rows] != hearers).all()
+    links = np.zeros_like(record.links)
+    np.add.at(links, (record.messages["sender"][rows], hearers), 1)
+    assert np.array_equal(links, record.links)

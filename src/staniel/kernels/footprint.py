@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
-__all__ = ["BODY", "Mount", "camera_axes", "camera_axis", "in_cone", "look", "warm"]
+__all__ = ["BODY", "Mount", "camera_axes", "camera_axis", "in_cone", "in_range", "look", "warm"]
 
 Array = NDArray[np.float64]
 Mount = tuple[float, float, float, float, float, float]
@@ -99,6 +99,12 @@ def camera_axes(aircraft: Array, looks: Array, mount: Mount) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
+def in_range(slant: float, reach: float) -> bool:
+    """Whether a point `slant` away is within the slant range `reach` [m], which is in it."""
+    return slant <= reach * (1.0 + _ROUNDING)
+
+
+@njit(cache=True, error_model="numpy")
 def in_cone(
     dx: float,
     dy: float,
@@ -116,7 +122,7 @@ def in_cone(
     """
     slant = math.sqrt(dx * dx + dy * dy + dz * dz)
     along = dx * axis_x + dy * axis_y + dz * axis_z
-    return along >= (cosine - _ROUNDING) * slant and slant <= reach * (1.0 + _ROUNDING)
+    return along >= (cosine - _ROUNDING) * slant and in_range(slant, reach)
 
 
 @njit(cache=True, error_model="numpy")

@@ -22,6 +22,7 @@ ALWAYS = (
     "births",
     "search",
     "visibility",
+    "unseen",
 )
 """What every mission calls. Others are named by the scenario that uses them."""
 

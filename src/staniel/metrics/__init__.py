@@ -5,15 +5,19 @@ from staniel.metrics.flown import EXPOSURE_RANGE
 from staniel.metrics.following import GATE, gospa_steps
 from staniel.metrics.gospa import CUTOFF, ORDER, Gospa, gospa
 from staniel.metrics.picture import team_picture
+from staniel.metrics.unseen import Cause, Unwatched, unwatched
 
 __all__ = [
     "CUTOFF",
     "EXPOSURE_RANGE",
     "GATE",
     "ORDER",
+    "Cause",
     "Gospa",
+    "Unwatched",
     "compute_metrics",
     "gospa",
     "gospa_steps",
     "team_picture",
+    "unwatched",
 ]

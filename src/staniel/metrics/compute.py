@@ -8,6 +8,7 @@ from staniel.metrics.following import follow
 from staniel.metrics.links import sender_metrics
 from staniel.metrics.targets import target_metrics
 from staniel.metrics.team import team_metrics
+from staniel.metrics.unseen import unwatched_metrics
 from staniel.metrics.visible import visible_samples
 from staniel.record import Record
 
@@ -33,13 +34,16 @@ def compute_metrics(record: Record) -> dict[str, Any]:
     """
     following = follow(record)
     targets = target_metrics(record, following, visible_samples(record))
+    causes, team_causes = unwatched_metrics(record)
     metrics = {
         "scenario": record.scenario.get("name"),
         "seed": record.scenario.get("seed"),
         "version": record.version,
         "duration": float(record.times[-1]) if len(record.times) else 0.0,
         "complete": bool(record.complete),
-        "targets": targets,
+        "targets": [
+            {**target, **unwatched} for target, unwatched in zip(targets, causes, strict=True)
+        ],
         "aircraft": [
             {**flown, **dangers, **heard}
             for flown, dangers, heard in zip(
@@ -51,6 +55,7 @@ def compute_metrics(record: Record) -> dict[str, Any]:
         ],
         "team": {
             **team_metrics(record, following, targets),
+            **team_causes,
             "risk_noticed": noticed_metrics(record),
         },
     }

@@ -7,7 +7,15 @@ from staniel.datatypes.truth import CAMERA
 from staniel.kernels.visibility import seen_by
 from staniel.record import Record
 
-__all__ = ["condition_samples", "gaps", "sample_step", "since", "visible_samples", "whole_seconds"]
+__all__ = [
+    "condition_samples",
+    "gaps",
+    "sample_step",
+    "since",
+    "visible_decisions",
+    "visible_samples",
+    "whole_seconds",
+]
 
 Floats = NDArray[np.float64]
 
@@ -27,15 +35,27 @@ def visible_samples(record: Record) -> NDArray[np.bool_]:
     (m, n_vehicles) bool array
         At ``record.fine_times``.
     """
-    cameras = record.cameras
-    vehicles = np.ascontiguousarray(record.fine_vehicles, dtype=np.float64)
-    works, looks = condition_samples(record, CAMERA), record.looks(record.fine_times)
+    works = condition_samples(record, CAMERA)
+    return _visible(record, record.fine_times, record.fine_aircraft, record.fine_vehicles, works)
+
+
+def visible_decisions(record: Record) -> NDArray[np.bool_]:
+    """`visible_samples` of the decision instants, (n, n_vehicles) bool array."""
+    works = record.condition[:, :, CAMERA] > 0.0
+    return _visible(record, record.times, record.aircraft, record.vehicles, works)
+
+
+def _visible(
+    record: Record, times: Floats, aircraft: Floats, vehicles: Floats, works: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    cameras, looks = record.cameras, record.looks(times)
+    vehicles = np.ascontiguousarray(vehicles, dtype=np.float64)
     visible = np.zeros(vehicles.shape[:2], dtype=np.bool_)
     for k, camera in enumerate(cameras):
         if camera in cameras[:k]:
             continue
         # One kind at a time: the cameras of the others, and dead ones, are nowhere.
-        poses = np.array(record.fine_aircraft, dtype=np.float64)
+        poses = np.array(aircraft, dtype=np.float64)
         poses[~(works & [other == camera for other in cameras]), 2] = _NOWHERE
         visible |= (
             seen_by(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from staniel.record import Record
 
 __all__ = [
+    "CAUSES",
     "EDGE",
     "GROUND",
     "INK",
@@ -51,6 +52,20 @@ GROUND: Final[Rgb] = (250, 249, 245)
 EDGE: Final[Rgb] = (140, 140, 146)
 ROOF_LOW: Final[Rgb] = (226, 226, 226)
 ROOF_HIGH: Final[Rgb] = (150, 150, 158)
+
+CAUSES: Final[dict[str, Rgb]] = {
+    "watched": (0, 158, 115),
+    "aircraft lost": (64, 64, 70),
+    "nobody assigned": (168, 168, 174),
+    "out of range": (190, 220, 240),
+    "outside footprint": (100, 172, 220),
+    "building": (0, 92, 152),
+    "missed detection": (253, 218, 140),
+    "message lost": (238, 150, 50),
+    "track lost": (176, 72, 0),
+}
+"""Of what a second of a vehicle was, in the order of `staniel.metrics.Cause`: what the team lacks
+in greys, what hides in blues, what was perceived and lost again in ambers."""
 
 _LONGEST_STEP: Final = 40.0
 """A track estimate that moves further in one step [m] has jumped: no line is drawn."""

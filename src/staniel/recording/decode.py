@@ -76,8 +76,11 @@ def decode(contents: Contents) -> Record:
     city = _city(contents)
     ticks = _whole_ticks(contents.ticks)
     truth = [entry for _, entry in _entries(ticks, "truth")]
-    poses, links = _poses(truth), _Links()
-    condition, wind = _conditions(ticks, poses["aircraft"].shape[1])
+    poses, hearing = _poses(truth), _Hearing()
+    count = poses["aircraft"].shape[1]
+    condition, wind = _conditions(ticks, count)
+    messages = _table(ticks, "messages", MESSAGE_DTYPE, hearing.row, ("cost", "x", "y"))
+    receptions, links = hearing.gathered(count)
     return Record(
         scenario=scenario,
         version=version,
@@ -85,11 +88,12 @@ def decode(contents: Contents) -> Record:
         **poses,
         sightings=_table(ticks, "sightings", SIGHTING_DTYPE, _sighting),
         tracks=_table(ticks, "tracks", TRACK_DTYPE, _track),
-        messages=_table(ticks, "messages", MESSAGE_DTYPE, links.row, ("cost", "x", "y")),
+        messages=messages,
         commands=_table(ticks, "commands", COMMAND_DTYPE, _command, _PATH_COLUMNS),
         decisions=_table(ticks, "decisions", DECISION_DTYPE, _decision),
         complete=contents.complete,
-        links=links.counted(poses["aircraft"].shape[1]),
+        links=links,
+        receptions=receptions,
         condition=condition,
         wind=wind,
         threats=_table(ticks, "threats", THREAT_DTYPE, _threat, ("x", "y", "cxx", "cxy", "cyy")),
@@ -297,8 +301,8 @@ def _message(_: float, item: Mapping[str, Any]) -> Row:
     )  # fmt: skip
 
 
-class _Links:
-    """Who heard whom: gathered row by row, counted at the end."""
+class _Hearing:
+    """Who heard what: taken down row by row, gathered at the end."""
 
     def __init__(self) -> None:
         self._senders: list[int] = []
@@ -309,17 +313,21 @@ class _Links:
         self._heard_by.append(item["heard_by"])
         return _message(time, item)
 
-    def counted(self, count: int) -> NDArray[np.int64]:
-        """(count, count) broadcasts of each aircraft (row) that each one (column) heard."""
+    def gathered(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+        """A record's `receptions`, and its `links`: their number for each two aircraft."""
         try:
             lengths = [len(heard) for heard in self._heard_by]
-            senders = np.repeat(np.array(self._senders, dtype=np.int64), lengths)
+            senders = np.array(self._senders, dtype=np.int64)
+            rows = np.repeat(np.arange(len(senders)), lengths)
             receivers = np.fromiter(chain.from_iterable(self._heard_by), np.int64, sum(lengths))
         except _MALFORMED as error:
             raise _malformed("/staniel/messages", error) from error
-        known = (senders >= 0) & (senders < count) & (receivers >= 0) & (receivers < count)
-        links = senders[known] * count + receivers[known]
-        return np.bincount(links, minlength=count * count).reshape(count, count).astype(np.int64)
+        known = (receivers >= 0) & (receivers < count)
+        receptions = np.stack([rows[known], receivers[known]], axis=1).astype(np.int32)
+        senders = senders[rows]
+        known &= (senders >= 0) & (senders < count)
+        links = np.bincount(senders[known] * count + receivers[known], minlength=count * count)
+        return receptions, links.reshape(count, count).astype(np.int64)
 
 
 _PATH_COLUMNS: Final = ("ax", "ay", "bx", "by", "radius")

@@ -24,6 +24,9 @@ REFRESH = 0.2
 PATIENCE = 1.5
 """Kernels that take longer to be ready are being compiled, not loaded [s]."""
 
+REASONS = 3
+"""So many causes of what was unwatched are named, the largest first: what fits in one line."""
+
 FILES = {
     "mission.mcap": "the record: every tick, opens in Foxglove",
     "scenario.toml": "the scenario as it was flown, with seed and version",
@@ -105,7 +108,7 @@ class Reporter:
             self._say(f"{info['reason']}; the record until then is kept")
 
     def summarise(self, run: Flown) -> None:
-        """Tables of the targets, the aircraft and the team, and the list of files."""
+        """Tables of the targets, the aircraft and the team, why unseen, and the list of files."""
         metrics = run.metrics
         self.console.print(
             _table(
@@ -120,6 +123,8 @@ class Reporter:
                 },
             )
         )
+        if reasons := _reasons(metrics["team"]):
+            self._say(reasons)
         self.console.print(
             _table(
                 "Aircraft",
@@ -197,6 +202,19 @@ def _team(metrics: Mapping[str, Any]) -> Table:
     table.add_row("messages delivered", _cell(team.get("messages_delivered"), of, 0))
     table.add_row("real-time factor", _cell(metrics.get("real_time_factor"), "×", 0))
     return table
+
+
+def _reasons(team: Mapping[str, Any]) -> str:
+    """How much of the vehicles' time nobody watched, and what it was for the most part."""
+    causes: Mapping[str, float] = team.get("unwatched", {})
+    unwatched = sum(causes.values())
+    total = team.get("watched", 0.0) + unwatched
+    if total <= 0.0:
+        return ""
+    largest = sorted(causes.items(), key=lambda item: -item[1])[:REASONS]
+    shares = {name.replace("_", " "): 100.0 * seconds / total for name, seconds in largest}
+    named = ", ".join(f"{name} {share:.0f}%" for name, share in shares.items() if share >= 0.5)
+    return f"unwatched {100.0 * unwatched / total:.0f}%" + (f": {named}" if named else "")
 
 
 def _cell(value: float | None, unit: str, digits: int) -> str:
