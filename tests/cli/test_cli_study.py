@@ -111,7 +111,7 @@ def test_report_is_one_page_with_its_figures(folder):
     page = (folder / "report.html").read_text()
     tags = Tags()
     tags.feed(page)
-    assert tags.seen.count("svg") == 2
+    assert tags.seen.count("svg") == 3
     assert tags.seen.count("li") == 2
     assert "A &amp; B &lt;small&gt;" in page
     assert "http" not in page.replace("http://www.w3.org", "").replace("http://purl", "").replace(

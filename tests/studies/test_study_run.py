@@ -54,6 +54,10 @@ def test_the_figures_are_those_of_the_flight(flown, tmp_path):
     for name, value in metrics["targets"][0].items():
         if name in CATALOGUE:
             assert row[name] == value, name
+    causes = metrics["targets"][0]["unwatched"]
+    assert row["watched"] == metrics["targets"][0]["watched"]
+    assert {name: row[f"unwatched_{name}"] for name in causes} == causes
+    assert row["watched"] + sum(causes.values()) == pytest.approx(metrics["duration"])
     assert row["team_gospa_mean"] == metrics["team"]["gospa_mean"]
     distances = [one["distance"] for one in metrics["aircraft"]]
     assert row["aircraft_distance"] == pytest.approx(math.fsum(distances))

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-__all__ = ["CATALOGUE", "Metric", "check_metric", "figures"]
+from staniel.metrics import Cause
+
+__all__ = ["CATALOGUE", "CAUSES", "Metric", "check_metric", "figures"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,16 @@ _VEHICLE: Final = {
     "course_rmse": Metric("course error", "rad", "lower"),
     "identity_switches": Metric("identity switches", "", "lower"),
 }
+_CAUSES: Final = {
+    "watched": Metric("watched", "s", "higher"),
+    **{
+        f"unwatched_{cause.key}": Metric(f"unwatched: {cause.words}", "s", "lower")
+        for cause in Cause
+        if cause != Cause.WATCHED
+    },
+}
+"""Seconds of each vehicle, in the order of `staniel.metrics.Cause`."""
+
 _TEAM: Final = {
     "gospa_mean": Metric("mean GOSPA", "m", "lower"),
     "gospa_localisation": Metric("GOSPA, localisation", "m²", "lower"),
@@ -82,11 +94,16 @@ _TOGETHER: Final = {"min_separation": "min", "heard_share": "mean"}
 
 CATALOGUE: Final[Mapping[str, Metric]] = {
     **_VEHICLE,
+    **_CAUSES,
     **{f"team_{name}": metric for name, metric in _TEAM.items()},
     **{f"aircraft_{name}": metric for name, metric in _AIRCRAFT.items()},
 }
 """Every metric by its column. Those of vehicles differ from row to row of a run, the others do
 not."""
+
+
+CAUSES: Final = tuple(_CAUSES)
+"""Columns of the seconds of each cause why a vehicle is not watched, watched ones first."""
 
 
 def check_metric(where: str, name: str) -> None:
@@ -127,6 +144,9 @@ def figures(metrics: Mapping[str, Any]) -> list[dict[str, float | int | None]]:
     rows: list[dict[str, float | int | None]] = []
     for target in metrics["targets"] or [{"id": -1}]:
         row = {"vehicle": target["id"], **{name: target.get(name) for name in _VEHICLE}}
+        unwatched = target.get("unwatched", {})
+        row |= {f"unwatched_{cause}": seconds for cause, seconds in unwatched.items()}
+        row["watched"] = target.get("watched")
         share, first = target.get("visible_fraction_fine"), target.get("first_detection")
         if share is not None and first is not None:
             since = metrics["duration"] - first

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from staniel.studies.catalogue import CATALOGUE
+from staniel.pictures import draw_causes
+from staniel.studies.catalogue import CATALOGUE, CAUSES
 from staniel.studies.model import Factor, Study
 from staniel.studies.results import Results
 from staniel.studies.statistics import Estimate, estimate, run_values
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["Curve", "curves_of", "draw", "render"]
+__all__ = ["Curve", "curves_of", "draw", "draw_why", "render"]
 
 COLORS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#737373")
 """Okabe and Ito's palette, told apart with any colour vision."""
@@ -115,6 +116,29 @@ def draw(results: Results, curves: Sequence[Curve], metric: str) -> "Figure":
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
+    return figure
+
+
+def draw_why(results: Results) -> "Figure":
+    """Why vehicles went unwatched: a bar a point, of all its runs and vehicles."""
+    from matplotlib.figure import Figure
+
+    study, table = results.study, results.table
+    combinations = study.combinations()
+    totals = np.zeros((len(combinations), len(CAUSES)))
+    for column, name in enumerate(CAUSES):
+        seconds = np.nan_to_num(table[name].to_numpy(zero_copy_only=False).astype(np.float64))
+        totals[:, column] = np.bincount(table["point"].to_numpy(), seconds, len(combinations))
+    labels = [
+        ", ".join(
+            f"{factor.name} {factor.steps[step].label}"
+            for factor, step in zip(study.factors, steps, strict=True)
+        )
+        or study.name
+        for steps in combinations
+    ]
+    figure = Figure(figsize=(_SIZE[0], 1.1 + 0.24 * len(labels)), layout="constrained")
+    draw_causes(figure.subplots(), labels, totals)
     return figure
 
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from staniel.errors import OutputError
 from staniel.studies.catalogue import CATALOGUE
-from staniel.studies.plots import Curve, curves_of, draw, render
+from staniel.studies.plots import Curve, curves_of, draw, draw_why, render
 from staniel.studies.results import Results
 from staniel.studies.tables import summary
 
@@ -80,11 +80,14 @@ def write_report(results: Results) -> list[Path]:
             files[f"{FIGURES}/{name}.svg"] = svg
             files[f"{FIGURES}/{name}.png"] = render(figure, "png")
             parts.append(_figure(svg, curves, metric))
-    page = _page(results, summary(results), parts)
+    svg = render(draw_why(results), "svg")
+    files[f"{FIGURES}/why-unseen.svg"] = svg
+    files[f"{FIGURES}/why-unseen.png"] = render(draw_why(results), "png")
+    page = _page(results, summary(results), parts, svg)
     return _write(folder, {REPORT: page.encode(), **files})
 
 
-def _page(results: Results, about: Mapping[str, Any], figures: Sequence[str]) -> str:
+def _page(results: Results, about: Mapping[str, Any], figures: Sequence[str], causes: bytes) -> str:
     study = results.study
     title = escape(study.title or study.name)
     seeds = sorted(set(results.table["seed"].to_pylist()))
@@ -102,6 +105,10 @@ def _page(results: Results, about: Mapping[str, Any], figures: Sequence[str]) ->
         head,
         f'<h2>Claims</h2><ul class="claims">{claims}</ul>' if claims else "",
         "<h2>Figures</h2>" + "".join(figures) if figures else "",
+        "<h2>Why unseen</h2><p>Each second of each vehicle is watched, that is visible and with a "
+        "track within 10 m, or it has the first of these causes that holds (order and tests: "
+        "docs/metrics.md).</p>"
+        + _embedded(causes, "what each second of the vehicles was, at each point"),
         _table(results, about),
         _failures(about["failures"]),
         _how(results, len(seeds)),
@@ -123,12 +130,17 @@ def _claim(claim: Mapping[str, Any]) -> str:
 
 
 def _figure(svg: bytes, curves: Sequence[Curve], metric: str) -> str:
+    factor = curves[0].factor
+    label = f"{CATALOGUE[metric].label} over {factor.label or factor.name}"
+    return _embedded(svg, f"{label}: means and 95 % intervals")
+
+
+def _embedded(svg: bytes, caption: str) -> str:
     text = svg.decode()
     text = text[text.index("<svg") :]
-    label = f"{CATALOGUE[metric].label} over {curves[0].factor.label or curves[0].factor.name}"
     return (
-        f'<figure role="img" aria-label="{escape(label)}">{text}'
-        f"<figcaption>{escape(label)}: means and 95 % intervals.</figcaption></figure>"
+        f'<figure role="img" aria-label="{escape(caption)}">{text}'
+        f"<figcaption>{escape(caption)}.</figcaption></figure>"
     )
 
 
