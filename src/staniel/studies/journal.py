@@ -7,6 +7,7 @@ was whole is lost, and what was torn is flown anew.
 import errno
 import json
 import os
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -91,7 +92,8 @@ class Journal:
         self._end += len(line)
         # What it cost is for people: it is no reason to stop.
         with suppress(OSError), self._times_path.open("ab") as times:
-            times.write(_line({**entry, "seconds": outcome.seconds, "where": outcome.where}))
+            cost = {"seconds": outcome.seconds, "where": outcome.where, "at": time.time()}
+            times.write(_line({**entry, **cost}))
 
     def forget(self, runs: set[tuple[int, int]]) -> None:
         """Let runs count as not flown: they are flown again, and the new line counts."""
