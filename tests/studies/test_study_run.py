@@ -2,6 +2,9 @@
 
 import json
 import math
+import shutil
+import subprocess
+import sys
 
 import pyarrow.parquet as pq
 import pytest
@@ -9,7 +12,7 @@ from small_study import TEXT, small
 
 import staniel
 from staniel.errors import OutputError, StudyError
-from staniel.studies import read_results, run
+from staniel.studies import load_study, read_results, run
 from staniel.studies.catalogue import CATALOGUE
 from staniel.studies.load import points_of
 from staniel.studies.results import RESULTS
@@ -158,6 +161,39 @@ def test_seeds_are_added_until_the_interval_is_narrow(tmp_path):
     text = text.replace("1e-9", "1e6").replace("seeds = 2", "seeds = 3")
     table = run(small(tmp_path, text), tmp_path / "wide", workers=1)
     assert sorted(set(table["seed"].to_pylist())) == [0, 1, 2]
+
+
+def test_a_disk_too_full_for_the_table_leaves_the_journal(flown, tmp_path):
+    folder, _, _ = flown
+    out = tmp_path / "out"
+    shutil.copytree(folder, out)
+    (out / RESULTS).unlink()
+    program = f"""
+import resource, signal, pathlib
+from staniel.errors import OutputError
+from staniel.studies import load_study
+from staniel.studies.journal import Journal
+from staniel.studies.load import points_of
+from staniel.studies.results import write_table
+study = load_study({str(folder.parent / "small.toml")!r})
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+folder = pathlib.Path({str(out)!r})
+with Journal(folder) as journal:
+    try:
+        write_table(folder, study, points_of(study), journal)
+    except OutputError as error:
+        print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert "results.parquet: cannot be written" in done.stdout
+    names = {path.name for path in out.iterdir()}
+    assert names == {"study.json", "runs.jsonl", "times.jsonl", "failures.json"}
+    assert (out / "runs.jsonl").read_bytes() == (folder / "runs.jsonl").read_bytes()
+    run(load_study(folder.parent / "small.toml"), out)
+    assert (out / RESULTS).read_bytes() == (folder / RESULTS).read_bytes()
 
 
 def test_damaged_results_are_refused(flown, tmp_path):
