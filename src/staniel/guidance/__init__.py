@@ -1,6 +1,7 @@
-"""How to fly it: loiters and pursuit policies."""
+"""How to fly it: loiters, pursuit policies and shortest paths."""
 
 from staniel.guidance.config import GuidanceConfig
+from staniel.guidance.dubins import Paths, Word, shortest
 from staniel.guidance.loiter import loiter
 from staniel.guidance.pursuit import (
     Policy,
@@ -13,11 +14,14 @@ from staniel.guidance.pursuit import (
 
 __all__ = [
     "GuidanceConfig",
+    "Paths",
     "Policy",
     "Pursuit",
+    "Word",
     "carrot",
     "loiter",
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",
+    "shortest",
 ]
