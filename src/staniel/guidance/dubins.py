@@ -142,8 +142,8 @@ def shortest(starts: ArrayLike, goals: ArrayLike, radius: float) -> Paths:
     - The shortest length jumps where a turn shrinks to nothing and reappears as a whole circle, or
       where a word ceases to exist. A path is taken to be on the short side of a jump if it then
       ends within 1e-13 (d + R |c| + R/50) of its goal, d the distance of the poses, c the
-      difference of their courses, R the radius. So rounding in what is handed in, which puts a goal
-      meant to be straight ahead a hair to the side, does not cost a circle.
+      difference of their courses, R the radius. So rounding in what is handed in, which puts the
+      end of a quarter circle a hair inside of it, does not cost a circle.
     - Where RLR or LRL only just exist, their outer circles 4 R apart, length goes with the root
       of what is missing, and a rounding of 1e-16 becomes 1e-8.
 
