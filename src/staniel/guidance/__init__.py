@@ -2,6 +2,7 @@
 
 from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.dubins import Paths, Word, shortest
+from staniel.guidance.dubins_wind import WindPath, shortest_in_wind
 from staniel.guidance.loiter import loiter
 from staniel.guidance.pursuit import (
     Policy,
@@ -17,6 +18,7 @@ __all__ = [
     "Paths",
     "Policy",
     "Pursuit",
+    "WindPath",
     "Word",
     "carrot",
     "loiter",
@@ -24,4 +26,5 @@ __all__ = [
     "pursuit_policy",
     "pursuit_policy_named",
     "shortest",
+    "shortest_in_wind",
 ]
