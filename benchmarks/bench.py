@@ -16,10 +16,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+import dubins
 import sight
 from staniel.agent import Agent
 from staniel.city import City
-from staniel.kernels import dubins
 from staniel.kernels.random import normals
 from staniel.kernels.warm import warm_all
 from staniel.mission import Mission
@@ -204,7 +204,7 @@ def particle_step(n: int) -> None:
 
 
 def small_kernels(n: int) -> None:
-    """Random normals and Dubins lengths."""
+    """Random normals."""
     out, generator = np.empty(8000, dtype=np.float32), np.random.default_rng(0)
     key = np.uint64(7)
     race(
@@ -216,21 +216,6 @@ def small_kernels(n: int) -> None:
             "numpy Generator": lambda: generator.standard_normal(out=out, dtype=np.float32),
         },
         10 * n,
-    )
-    goals = np.column_stack(
-        [generator.uniform(-300, 300, (1000, 2)), generator.uniform(-3, 3, 1000)]
-    )
-    start = np.zeros(3)
-    plain = dubins.shortest.py_func
-    race(
-        "shortest Dubins path, six words",
-        "ns per query",
-        1000e-9,
-        {
-            "staniel": lambda: dubins.lengths(start, goals, 30.0),
-            "the same in Python": lambda: [plain(0.0, 0.0, 0.0, *goal, 30.0) for goal in goals],
-        },
-        n,
     )
 
 
@@ -248,6 +233,7 @@ def main() -> None:
     particle_step(50 if quick else 300)
     sight.compare((100, 1_000) if quick else (100, 1_000, 10_000), 3 if quick else 15)
     small_kernels(5 if quick else 20)
+    dubins.compare(repeats=3 if quick else 9)
     world_tick([1000, 3000, 10_000], ticks=10 if quick else 30)
     scaling([4, 16, 64] if quick else [4, 16, 64, 128], 20 if quick else 60)
 

@@ -19,7 +19,7 @@ from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
 from staniel.guidance import GuidanceConfig, KnownDangers, Pursuit, loiter, pursuit_policy_named
-from staniel.kernels.dubins import lengths
+from staniel.kernels.dubins import shortest
 from staniel.tracking import Tracker, TrackingConfig
 
 __all__ = ["Agent", "Briefing"]
@@ -143,11 +143,11 @@ class Agent:
             return []
         pose = percept.pose
         goals = [(*track.position.tolist(), track.course) for track in tracks]
-        costs = lengths(
-            np.array((pose.x, pose.y, pose.heading)),
+        costs = shortest(
+            np.array(((pose.x, pose.y, pose.heading),)),
             np.array(goals),
             self._briefing.airframe.min_turn_radius,
-        ).tolist()
+        )[0].tolist()
         own = [tuple(sighting.position.tolist()) for sighting in percept.sightings]
         # Sightings may be older than the percept that hands them out.
         looked = min((sighting.time for sighting in percept.sightings), default=math.inf)
