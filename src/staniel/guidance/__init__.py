@@ -1,7 +1,17 @@
-"""How to fly it: loiters and pursuit policies, and the dangers known on the way."""
+"""How to fly it: paths and how to follow them, loiters and pursuit policies, known dangers."""
 
 from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers, KnownDangers
+from staniel.guidance.following import (
+    Follower,
+    carrot_line,
+    carrot_loiter,
+    follower_named,
+    follower_names,
+    heading_for_course,
+    line_course,
+    orbit_course,
+)
 from staniel.guidance.loiter import loiter
 from staniel.guidance.pursuit import (
     Policy,
@@ -15,12 +25,20 @@ from staniel.guidance.pursuit import (
 __all__ = [
     "NO_DANGERS",
     "Dangers",
+    "Follower",
     "GuidanceConfig",
     "KnownDangers",
     "Policy",
     "Pursuit",
     "carrot",
+    "carrot_line",
+    "carrot_loiter",
+    "follower_named",
+    "follower_names",
+    "heading_for_course",
+    "line_course",
     "loiter",
+    "orbit_course",
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",
