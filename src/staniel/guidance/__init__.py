@@ -1,9 +1,19 @@
-"""How to fly it: loiters, pursuit policies and shortest paths, and the dangers on the way."""
+"""How to fly it: paths and how to follow them, loiters and pursuit policies, known dangers."""
 
 from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers, KnownDangers
 from staniel.guidance.dubins import Paths, Word, shortest
 from staniel.guidance.dubins_wind import WindPath, shortest_in_wind
+from staniel.guidance.following import (
+    Follower,
+    carrot_line,
+    carrot_loiter,
+    follower_named,
+    follower_names,
+    heading_for_course,
+    line_course,
+    orbit_course,
+)
 from staniel.guidance.loiter import loiter
 from staniel.guidance.pursuit import (
     Policy,
@@ -17,6 +27,7 @@ from staniel.guidance.pursuit import (
 __all__ = [
     "NO_DANGERS",
     "Dangers",
+    "Follower",
     "GuidanceConfig",
     "KnownDangers",
     "Paths",
@@ -25,7 +36,14 @@ __all__ = [
     "WindPath",
     "Word",
     "carrot",
+    "carrot_line",
+    "carrot_loiter",
+    "follower_named",
+    "follower_names",
+    "heading_for_course",
+    "line_course",
     "loiter",
+    "orbit_course",
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",

@@ -1,5 +1,8 @@
 """How an aircraft is flown to what it was assigned."""
 
+import math
+from typing import Literal
+
 from pydantic import Field
 
 from staniel.datatypes.config import Config
@@ -8,7 +11,7 @@ __all__ = ["GuidanceConfig"]
 
 
 class GuidanceConfig(Config):
-    """Pursuit by a policy chosen by name, and the loiters around it."""
+    """Pursuit by a policy chosen by name, the loiters around it, and how paths are followed."""
 
     pursuit: str = Field("carrot", description="name of the pursuit policy")
     prediction_steps: int = Field(
@@ -21,3 +24,14 @@ class GuidanceConfig(Config):
     recover_time: float = Field(
         25.0, ge=0.0, description="loiter on a lost target's last place [s]"
     )
+    following: Literal["carrot", "vector-field"] = Field(
+        "carrot", description="how the autopilot follows lines and orbits"
+    )
+    approach_deg: float = Field(
+        60.0, gt=0.0, le=90.0, description="vector field: greatest angle to a line it joins [deg]"
+    )
+
+    @property
+    def approach(self) -> float:
+        """Greatest angle at which the vector field joins a line [rad]."""
+        return math.radians(self.approach_deg)

@@ -8,7 +8,8 @@ Columns of a state row: x, y, z, heading, bank, speed. Columns of a command row 
 - `BANKS`: hold [s], count, and up to `MAX_BANKS` banks [rad].
 
 Columns of a limits row: min_speed, max_speed, max_acceleration, max_climb, max_bank, max_roll_rate,
-roll_gain, course_gain, speed_gain, climb_gain, altitude_gain.
+roll_gain, course_gain, speed_gain, climb_gain, altitude_gain, follower (a number of
+`staniel.kernels.following`), approach (of its vector field [rad]).
 
 The autopilot steers its *course over ground*, which it measures: in wind it crabs. Without wind
 course and heading are the same number.
@@ -20,6 +21,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.following import line_rate, orbit_rate, wrapped
+
 __all__ = ["BANKS", "COMMAND_WIDTH", "LINE", "MAX_BANKS", "ORBIT", "fly", "warm"]
 
 Array = NDArray[np.float64]
@@ -28,15 +31,6 @@ LINE, ORBIT, BANKS = 0, 1, 2
 MAX_BANKS = 16
 COMMAND_WIDTH = 5 + MAX_BANKS
 _G = 9.80665
-_TWO_PI = 2.0 * math.pi
-
-
-@njit(cache=True, error_model="numpy")
-def _wrapped(angle: float) -> float:
-    """Angle in (-pi, pi]."""
-    wrapped = angle - _TWO_PI * math.ceil((angle - math.pi) / _TWO_PI)
-    # Rounding may leave the quotient a hair off a whole number.
-    return math.pi if wrapped <= -math.pi else wrapped
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,53 +47,6 @@ def _over_ground(state: Array, east: float, north: float) -> tuple[float, float,
     course, speed = math.atan2(y, x), math.hypot(x, y)
     along = max(state[5] * math.cos(state[3] - course), 0.25 * state[5])
     return course, speed, speed / along
-
-
-@njit(cache=True, error_model="numpy")
-def _line_rate(state: Array, command: Array, gain: float, course: float, speed: float) -> float:
-    """Rate of the course that follows a line: thesis algorithm 5.3 (corrected).
-
-    The carrot runs ``delta = 4 V / gain`` ahead of the foot of the perpendicular, V over ground.
-    With roll at once, the cross-track error d obeys d'' + gain d' + gain V / delta d = 0,
-    critically damped for this delta. With first-order roll K the roots are those of
-    s³ + K s² + K gain s + K gain²/4: a slow real one and a pair, damped by 0.69 at K = 2 gain and
-    better above.
-    """
-    x, y = state[0], state[1]
-    start_x, start_y = command[3], command[4]
-    along_x, along_y = command[5] - start_x, command[6] - start_y
-    length = math.hypot(along_x, along_y)
-    if length > 0.0:
-        along_x, along_y = along_x / length, along_y / length
-        ahead = (x - start_x) * along_x + (y - start_y) * along_y + 4.0 * speed / gain
-    else:
-        ahead = 0.0  # No direction: the carrot stays at the point.
-    carrot_x, carrot_y = start_x + ahead * along_x, start_y + ahead * along_y
-    rate: float = gain * _wrapped(math.atan2(carrot_y - y, carrot_x - x) - course)
-    return rate
-
-
-@njit(cache=True, error_model="numpy")
-def _orbit_rate(state: Array, command: Array, gain: float, course: float, speed: float) -> float:
-    r"""Rate of the course that joins and keeps an orbit: thesis algorithm 5.3 (corrected).
-
-    The carrot runs a look-ahead angle :math:`\lambda` ahead on the circle. From a place on the
-    circle it lies :math:`\lambda/2` inside the tangent, so that much is taken off the course again
-    (fading with r/D outside, where it would spoil the approach), and the steady turn's own rate V/D
-    is added. What is left is zero on the orbit: no standing error of the radius. To first order the
-    look-ahead distance is then 2 r tan(lambda/2); lambda makes it the line's 4 V / gain.
-    """
-    x, y = state[0] - command[3], state[1] - command[4]
-    radius, turn = command[5], command[6]
-    distance = math.hypot(x, y)
-    outside = max(distance, radius)
-    half = math.atan(2.0 * speed / (gain * radius))
-    # Angle of the carrot's direction against the outward radius, for a counter-clockwise orbit.
-    aside = math.atan2(radius * math.sin(2.0 * half), radius * math.cos(2.0 * half) - distance)
-    aside -= half * radius / outside
-    error = _wrapped(math.atan2(y, x) + turn * aside - course)
-    rate: float = gain * error + turn * speed / outside * max(0.0, math.sin(aside))
-    return rate
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,10 +99,11 @@ def _wanted_bank(
         wanted = command[5 + step]
     else:
         course, speed, gearing = _over_ground(state, east, north)
+        law = int(limits[11])
         if kind == ORBIT:
-            rate = _orbit_rate(state, command, limits[7], course, speed)
+            rate = orbit_rate(law, state, command, limits[7], course, speed)
         else:
-            rate = _line_rate(state, command, limits[7], course, speed)
+            rate = line_rate(law, state, command, limits[7], limits[12], course, speed)
         wanted = math.atan(state[5] * rate * gearing / _G)
     inside: float = min(max(wanted, -limits[4]), limits[4])
     return inside
@@ -195,7 +143,7 @@ def _step(
         + 4.0 * middle_speed * math.sin(middle_heading)
         + end_speed * math.sin(end_heading)
     ) * (dt / 6.0) + north * dt
-    state[3] = _wrapped(end_heading)
+    state[3] = wrapped(end_heading)
     state[4] = end_bank
     state[5] = end_speed
 
@@ -220,7 +168,7 @@ def fly(
         Climb rates before; not changed.
     commands : (n, `COMMAND_WIDTH`) float array
         See the module's head. A bank sequence begins with the call.
-    limits : (n, 11) float array
+    limits : (n, 13) float array
         See the module's head.
     wind : (substeps, n, 2) float array [m/s]
         Velocity of the air around each aircraft, to east and north, held over a step.
@@ -262,7 +210,7 @@ def fly(
 
 def warm() -> None:
     """Compile, or load from the disk cache, what this module is flown with."""
-    limits = np.array([[11.0, 20.0, 1.5, 3.0, 0.6, 1.0, 3.0, 1.2, 1.0, 1.0, 0.25]])
+    limits = np.array([[11.0, 20.0, 1.5, 3.0, 0.6, 1.0, 3.0, 1.2, 1.0, 1.0, 0.25, 0.0, 1.0]])
     command = np.zeros((1, COMMAND_WIDTH))
     command[0, 1] = 15.0
     start = np.array([[0.0, 0.0, 80.0, 0.0, 0.0, 15.0]])

@@ -13,6 +13,7 @@ ALWAYS = (
     "footprint",
     "camera",
     "flight",
+    "following",
     "streets",
     "traffic",
     "radio",

@@ -69,6 +69,8 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         faults=scenario.faults,
         launch=scenario.launch,
         airframes=airframes,
+        following=scenario.guidance.following,
+        approach=scenario.guidance.approach,
     )
     lidar, risk = scenario.lidar, scenario.risk
     return Mission(

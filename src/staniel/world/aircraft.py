@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from staniel.datatypes.command import Command, FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import Airframe
 from staniel.kernels.flight import BANKS, COMMAND_WIDTH, LINE, MAX_BANKS, ORBIT
+from staniel.kernels.following import FOLLOWERS
 
 __all__ = ["encode", "limits"]
 
@@ -63,19 +64,28 @@ def _banks(command: FlyBanks) -> tuple[float, ...]:
     return (BANKS, command.speed, command.altitude, command.hold, count, *command.banks)
 
 
-def limits(airframes: Sequence[Airframe]) -> NDArray[np.float64]:
+def limits(
+    airframes: Sequence[Airframe],
+    following: str = "carrot",
+    approach: float = math.radians(60.0),
+) -> NDArray[np.float64]:
     """Rows of limits for `staniel.kernels.flight.fly`: see the head of that module.
 
     Parameters
     ----------
     airframes : sequence of Airframe
         One an aircraft.
+    following : str
+        How every autopilot follows lines and orbits, of `staniel.kernels.following.FOLLOWERS`.
+    approach : float [rad]
+        Greatest angle to a line at which the vector field joins it.
 
     Returns
     -------
-    (n, 11) float array
+    (n, 13) float array
     """
-    return np.array([_limits(airframe) for airframe in airframes], dtype=np.float64)
+    law = (FOLLOWERS[following], approach)
+    return np.array([(*_limits(airframe), *law) for airframe in airframes], dtype=np.float64)
 
 
 def _limits(airframe: Airframe) -> tuple[float, ...]:

@@ -52,6 +52,10 @@ class Fleet:
     wind : Wind
     faults : Faults
     launch : Launch
+    following : str
+        How the autopilots follow lines and orbits, of `staniel.kernels.following.FOLLOWERS`.
+    approach : float [rad]
+        Greatest angle at which the vector field joins a line.
 
     Raises
     ------
@@ -68,10 +72,12 @@ class Fleet:
         wind: Wind,
         faults: Faults,
         launch: Launch,
+        following: str,
+        approach: float,
     ) -> None:
         gust_key, fault_key = seed.generate_state(2, np.uint64)
         self._city, self._airframes, self._clock = city, airframes, clock
-        self._limits = limits(airframes)
+        self._limits = limits(airframes, following, approach)
         self._air = Air(wind, airframes, clock, gust_key)
         self._failures = Failures(faults, len(airframes), fault_key)
         self._pad = None if launch.kind == "air" else Pad(launch, airframes, city.tallest)

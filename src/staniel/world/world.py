@@ -1,5 +1,6 @@
 """The truth: how it begins and how it goes on from tick to tick."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,6 +43,10 @@ class World:
         In the air around the city when not given.
     airframes : sequence of Airframe, optional
         One an aircraft, where they are not all of one kind; then `airframe` does not count.
+    following : {"carrot", "vector-field"}, optional
+        How every autopilot follows lines and orbits.
+    approach : float [rad], optional
+        Greatest angle at which the vector field joins a line.
 
     Raises
     ------
@@ -63,6 +68,8 @@ class World:
         faults: Faults = Faults(),  # noqa: B008
         launch: Launch = Launch(),  # noqa: B008
         airframes: Sequence[Airframe] | None = None,
+        following: str = "carrot",
+        approach: float = math.radians(60.0),
     ) -> None:
         if aircraft_count < 1:
             raise ScenarioError(f"aircraft count = {aircraft_count}: expected at least 1")
@@ -71,7 +78,7 @@ class World:
             _check(one, city.tallest, wind.speed)
         self._clock = clock
         own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 0))
-        self._fleet = Fleet(city, airframes, clock, own, wind, faults, launch)
+        self._fleet = Fleet(city, airframes, clock, own, wind, faults, launch, following, approach)
         place_key, drive_key = seed.generate_state(2, np.uint64)
         self._drivers = drivers_of(city, traffic, clock, place_key, drive_key)
 
