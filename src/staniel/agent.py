@@ -7,18 +7,27 @@ What flies knows only what it saw, what it was told, and what it was ordered.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from staniel.city import City
-from staniel.cooperation import Allocation, CooperationConfig, SearchMap, Task
+from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMap, Task
 from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import Command, FlyLine
+from staniel.datatypes.command import Command, FlyBanks, FlyLine
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Heartbeat, Message, Point, Report
 from staniel.datatypes.risk import RiskRegion
-from staniel.guidance import GuidanceConfig, Pursuit, loiter, pursuit_policy_named
+from staniel.guidance import (
+    GuidanceConfig,
+    NoFeasibleFlight,
+    Partner,
+    Pursuit,
+    loiter,
+    pursuit_policy_named,
+    safe_loiter,
+)
 from staniel.kernels.dubins import lengths
 from staniel.tracking import Tracker, TrackingConfig
 
@@ -61,11 +70,13 @@ class Agent:
             turn_radius=airframe.min_turn_radius,
             step=clock.decision_step,
         )
+        self._helping = Helping(id, briefing.cooperation)
         self._search = SearchMap(
             briefing.chart, airframe, briefing.camera, cell=briefing.cooperation.search_cell
         )
         self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
         self._lookahead = briefing.guidance.prediction_steps * clock.decision_step
+        self._memory: dict[str, Any] = {}
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
         self.belief = Belief((), "search", None, (0.0, 0.0))
@@ -95,7 +106,8 @@ class Agent:
             outbox.append(
                 Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
             )
-        outbox.append(self._allocation.heartbeat(role, goal))
+        plan = command if role in ("pursue", "help") and isinstance(command, FlyBanks) else None
+        outbox.append(self._allocation.heartbeat(role, goal, self._helping.target, plan))
         held = self._allocation.holding
         self.belief = Belief(self._tracker.estimates, role, None if held is None else held.id, goal)
         return command, outbox
@@ -117,6 +129,8 @@ class Agent:
         )
         for old, new in self._allocation.renames:
             self._tracker.rename(old, new)
+        free = self._allocation.holding is None
+        self._helping.step(percept.time, percept.pose, free, inbox)
         return outbox
 
     def _tasks(self, percept: Percept, tracks: list[TrackEstimate]) -> list[Task]:
@@ -161,11 +175,13 @@ class Agent:
                 self._seen_holding = time
                 self._last_place = (held.position, time)
                 self._search.forget_goal()
-                return self._pursue(self._pursuit(time, pose, track)), "pursue", held.position
+                return *self._chase(time, pose, track, "pursue"), held.position
             since = max(self._seen_holding, held.since)
             if self._tracker_lost(held.id) or time - since > guidance.recover_time:
                 outbox.append(self._allocation.give_up())
             self._last_place = (held.position, since)
+        if self._helping.target is not None:
+            return self._help(time, pose, self._helping.target)
         if self._last_place is not None:
             place, since = self._last_place
             if time - since <= guidance.recover_time:
@@ -177,6 +193,28 @@ class Agent:
         start, goal = self._search.leg(time, pose, others)
         airframe = self._briefing.airframe
         return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
+
+    def _help(self, time: float, pose: Pose, target: TrackId) -> tuple[Command, str, Point]:
+        """Pursue what another holds; circle where it is said to be until an own track says it."""
+        self._last_place = None
+        self._search.forget_goal()
+        place, track = self._helping.position, self._track_named(target)
+        if track is None:
+            return (
+                loiter(pose, place, self._briefing.airframe, self._briefing.guidance),
+                "help",
+                place,
+            )
+        return *self._chase(time, pose, track, "help"), place
+
+    def _chase(
+        self, time: float, pose: Pose, track: TrackEstimate, role: str
+    ) -> tuple[Command, str]:
+        """What the policy commands, or a loiter that is safe, and then the role says so."""
+        try:
+            return self._pursue(self._pursuit(time, pose, track)), role
+        except NoFeasibleFlight:
+            return safe_loiter(pose, self._briefing.airframe, self._briefing.chart), "loiter"
 
     def _pursuit(self, time: float, pose: Pose, track: TrackEstimate) -> Pursuit:
         briefing = self._briefing
@@ -190,6 +228,12 @@ class Agent:
             camera=briefing.camera,
             chart=briefing.chart,
             config=briefing.guidance,
+            risk=briefing.risk,
+            partners=tuple(
+                Partner(beat.time, beat.pose, beat.plan)
+                for beat in self._helping.partners(track.id)
+            ),
+            memory=self._memory,
         )
 
     def _track_named(self, name: TrackId) -> TrackEstimate | None:

@@ -7,6 +7,7 @@ first two a receiver recognises a copy. The auction's words are those of thesis 
 from dataclasses import dataclass
 
 from staniel.datatypes.belief import Pose, Sighting, TrackId
+from staniel.datatypes.command import FlyBanks
 
 __all__ = [
     "Announce",
@@ -40,7 +41,11 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
-    """I am alive, here, doing this. A held target's award is a lease that this renews."""
+    """I am alive, here, doing this. A held target's award is a lease that this renews.
+
+    `helps` is the target that the sender watches beside its holder; `plan` is what it is about to
+    fly from `pose` on, where it pursues a target by a sequence of banks.
+    """
 
     pose: Pose
     role: str
@@ -48,6 +53,8 @@ class Heartbeat(Message):
     target: TrackId | None
     target_position: Point | None
     cost: float
+    helps: TrackId | None = None
+    plan: FlyBanks | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ head           16: kind 1, length 1, sender 2, sequence 4, time 8; every message
 track name     14: born 8, founder 2, serial 4
 point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
-heartbeat      head, pose, role 1, goal, track name, point, cost
+heartbeat      head, pose, role 1, goal, track name, point, cost; where it helps a track name, and
+               where it tells its plan hold 4, count 1, speed 4 and for each bank 2
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
 announce       head, track name, point, course 4, cost
 bid            head, track name, auctioneer 2, cost
@@ -64,4 +65,7 @@ def wire_size(message: Message) -> int:
     size = _SIZES.get(type(message), HEAD)
     if isinstance(message, Report):
         size += SIGHTING * len(message.sightings)
+    elif isinstance(message, Heartbeat):
+        size += _NAME if message.helps is not None else 0
+        size += 9 + 2 * len(message.plan.banks) if message.plan is not None else 0
     return size

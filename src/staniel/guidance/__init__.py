@@ -1,8 +1,12 @@
 """How to fly it: loiters and pursuit policies."""
 
-from staniel.guidance.config import GuidanceConfig
-from staniel.guidance.loiter import loiter
+from staniel.guidance.config import GuidanceConfig, LookaheadConfig
+from staniel.guidance.loiter import loiter, safe_loiter
+from staniel.guidance.lookahead import lookahead
+from staniel.guidance.orbit import best_radius, orbit
 from staniel.guidance.pursuit import (
+    NoFeasibleFlight,
+    Partner,
     Policy,
     Pursuit,
     carrot,
@@ -13,11 +17,18 @@ from staniel.guidance.pursuit import (
 
 __all__ = [
     "GuidanceConfig",
+    "LookaheadConfig",
+    "NoFeasibleFlight",
+    "Partner",
     "Policy",
     "Pursuit",
+    "best_radius",
     "carrot",
     "loiter",
+    "lookahead",
+    "orbit",
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",
+    "safe_loiter",
 ]

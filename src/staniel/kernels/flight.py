@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["BANKS", "COMMAND_WIDTH", "LINE", "MAX_BANKS", "ORBIT", "fly", "warm"]
+__all__ = ["BANKS", "COMMAND_WIDTH", "LINE", "MAX_BANKS", "ORBIT", "fly", "lagged", "warm"]
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ def _orbit_rate(state: Array, command: Array, gain: float, course: float, speed:
 
 
 @njit(cache=True, error_model="numpy")
-def _lagged(value: float, wanted: float, gain: float, max_rate: float, time: float) -> float:
+def lagged(value: float, wanted: float, gain: float, max_rate: float, time: float) -> float:
     """Exact solution of value' = clip(gain (wanted - value), ±max_rate) after `time`."""
     error = wanted - value
     linear = max_rate / gain
@@ -174,11 +174,11 @@ def _step(
     """One dynamics step of one aircraft, height excepted, in place; the wind is (east, north)."""
     wanted = _wanted_bank(state, command, limits, east, north, elapsed)
     bank, speed, heading = state[4], state[5], state[3]
-    middle_bank = _lagged(bank, wanted, limits[6], limits[5], 0.5 * dt)
-    end_bank = _lagged(bank, wanted, limits[6], limits[5], dt)
+    middle_bank = lagged(bank, wanted, limits[6], limits[5], 0.5 * dt)
+    end_bank = lagged(bank, wanted, limits[6], limits[5], dt)
     wanted_speed = min(max(command[1], limits[0]), limits[1])
-    middle_speed = _lagged(speed, wanted_speed, limits[8], limits[2], 0.5 * dt)
-    end_speed = _lagged(speed, wanted_speed, limits[8], limits[2], dt)
+    middle_speed = lagged(speed, wanted_speed, limits[8], limits[2], 0.5 * dt)
+    end_speed = lagged(speed, wanted_speed, limits[8], limits[2], dt)
     # Simpson's rule for heading, its companion for the half step, and Simpson again for the way.
     rate = _G / speed * math.tan(bank)
     middle_rate = _G / middle_speed * math.tan(middle_bank)

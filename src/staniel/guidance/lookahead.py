@@ -1,0 +1,187 @@
+"""Flying where the target will be seen: many sequences of banks, scored by what they would show.
+
+Every decision step the belief is first corrected by the looks since the last sighting that showed
+nothing, then thinned, led through the streets of the chart, and searched for the flight from which
+most of it is seen over the horizon. Its first second is flown, and the rest is what the next search
+has to beat. What a partner on the same target will see by its last plan heard counts for little.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.datatypes.command import FlyBanks
+from staniel.datatypes.risk import RiskRegion
+from staniel.guidance.pursuit import NoFeasibleFlight, Pursuit, pursuit_policy
+from staniel.kernels.flight import MAX_BANKS
+from staniel.kernels.forecast import discredit, forecast
+from staniel.kernels.lookahead import Eye, Search, plan, roll_out, shade
+from staniel.kernels.risk import Regions
+from staniel.kernels.sightlines import Sightlines, new_sightlines
+
+__all__ = ["lookahead"]
+
+Floats = NDArray[np.float64]
+
+_HOLD = 1.0  # of each bank [s]
+_SAMPLES = 2  # looks in a hold
+_STEP = _HOLD / _SAMPLES
+_MISS = 0.1  # probability that a camera misses what it could see
+_MOST_LOOKS = 40  # in vain, that are remembered
+_OLDEST_PLAN = 6.0  # of a partner that is still counted on [s]
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What the policy keeps from step to step."""
+
+    sightlines: Sightlines
+    regions: Regions
+    rates: Floats
+    choice: NDArray[np.int64]
+    planned: float = -math.inf
+    looks: list[tuple[float, ...]] = field(default_factory=list)
+
+
+@pursuit_policy("lookahead")
+def lookahead(pursuit: Pursuit) -> FlyBanks:
+    """Fly the sequence of banks that is expected to see the most of the target.
+
+    Raises
+    ------
+    NoFeasibleFlight
+        Every sequence meets a building of the chart or a no-fly region.
+    """
+    config, airframe, camera = pursuit.config.lookahead, pursuit.airframe, pursuit.camera
+    memory = _memory(pursuit)
+    banks = airframe.max_bank * np.linspace(-1.0, 1.0, config.banks)
+    steps = config.horizon * _SAMPLES
+    eye = Eye(camera.mounting, camera.half_aperture, camera.range)
+    cloud = _thinned(pursuit, memory)
+    places = forecast(pursuit.chart.walls, cloud, steps, _STEP)
+    weights = np.full(places.shape[:2], 1.0 / config.particles)
+    _share(pursuit, eye, places, weights)
+    search = Search(
+        banks,
+        config.horizon,
+        _SAMPLES,
+        _STEP,
+        airframe.roll_gain,
+        math.radians(airframe.max_roll_rate_deg),
+        config.width,
+        config.discount,
+        config.effort,
+    )
+    choice, _ = plan(
+        pursuit.chart.walls,
+        memory.sightlines,
+        eye,
+        search,
+        memory.regions,
+        memory.rates,
+        np.array(pursuit.pose),
+        places,
+        weights,
+        _left_over(memory, pursuit.time, config.banks // 2),
+    )
+    if not choice.size:
+        raise NoFeasibleFlight(f"no flight of {config.horizon} s is free from {pursuit.pose}")
+    memory.choice, memory.planned = choice, pursuit.time
+    sequence = tuple(banks[choice[:MAX_BANKS]].tolist())
+    return FlyBanks(sequence, _HOLD, airframe.speed, airframe.altitude)
+
+
+def _memory(pursuit: Pursuit) -> _Memory:
+    """The policy's own; new at first, and where the flight height has changed."""
+    altitude = pursuit.airframe.altitude
+    memory = pursuit.memory.get("lookahead")
+    if not isinstance(memory, _Memory):
+        lines = new_sightlines(altitude, pursuit.camera.target_height)
+        regions, rates = _regions(pursuit.risk, pursuit.config.lookahead.exposure)
+        choice = np.zeros(pursuit.config.lookahead.horizon, dtype=np.int64)
+        memory = pursuit.memory["lookahead"] = _Memory(lines, regions, rates, choice)
+    return memory
+
+
+def _left_over(memory: _Memory, time: float, straight: int) -> NDArray[np.int64]:
+    """What is left of the last plan, level at its end; level flight where there is none."""
+    gone = time - memory.planned
+    steps = round(gone / _HOLD) if gone < memory.choice.size * _HOLD else memory.choice.size
+    rest = memory.choice[steps:]
+    return np.concatenate((rest, np.full(memory.choice.size - rest.size, straight)))
+
+
+def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
+    """Particles of equal weight that stand for the belief, corrected by what was not seen."""
+    camera, track = pursuit.camera, pursuit.track
+    memory.looks = [look for look in memory.looks if look[0] > track.last_seen]
+    if track.last_seen < pursuit.time:
+        memory.looks.append((pursuit.time, *pursuit.pose[:5]))
+        memory.looks.extend(
+            (partner.time, *partner.pose[:5])
+            for partner in pursuit.partners
+            if partner.time > track.last_seen
+        )
+        memory.looks = sorted(set(memory.looks))[-_MOST_LOOKS:]
+    particles, weights = pursuit.cloud()
+    particles, weights = np.ascontiguousarray(particles), weights.copy()
+    discredit(
+        pursuit.chart.walls,
+        particles,
+        weights,
+        pursuit.time,
+        np.array(memory.looks).reshape(-1, 6),
+        camera.mounting,
+        camera.target_height,
+        camera.half_aperture,
+        camera.range,
+        _MISS,
+    )
+    count = pursuit.config.lookahead.particles
+    sums = np.cumsum(weights)
+    picks = np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
+    return np.ascontiguousarray(particles[np.minimum(picks, len(particles) - 1)])
+
+
+def _share(pursuit: Pursuit, eye: Eye, places: Floats, weights: Floats) -> None:
+    """Take from the weights what the partners will see, as far as their plans are known."""
+    airframe, trust = pursuit.airframe, pursuit.config.lookahead.trust
+    for partner in pursuit.partners:
+        age = pursuit.time - partner.time
+        if partner.plan is None or age > _OLDEST_PLAN:
+            continue
+        poses = roll_out(
+            np.array(partner.pose),
+            np.array(partner.plan.banks),
+            partner.plan.hold,
+            age,
+            len(places) - 1,
+            _STEP,
+            airframe.roll_gain,
+            math.radians(airframe.max_roll_rate_deg),
+        )
+        height = pursuit.camera.target_height
+        shade(pursuit.chart.walls, eye, poses, places, weights, height, trust)
+
+
+def _regions(risk: tuple[RiskRegion, ...], price: float) -> tuple[Regions, Floats]:
+    """Briefed regions as the search takes them, and what a second in each costs."""
+    box, disc, corners, first = [], [], [], [0]
+    for region in risk:
+        shape = list(region.polygon or ())
+        center, radius = region.center or (0.0, 0.0), region.radius or 0.0
+        box_of = shape or [(center[0] + r, center[1] + r) for r in (-radius, radius)]
+        x, y = zip(*box_of, strict=True)
+        top = math.inf if region.ceiling is None else region.ceiling
+        box.append((min(x), max(x), min(y), max(y), region.floor, top))
+        disc.append((*center, radius))
+        corners.extend(shape)
+        first.append(len(corners))
+    rates = [math.inf if region.rate is None else price * region.rate for region in risk]
+    arrays = (np.array(box).reshape(-1, 6), np.array(disc).reshape(-1, 3))
+    return (
+        Regions(*arrays, np.array(first), np.array(corners, dtype=np.float64).reshape(-1, 2)),
+        np.array(rates, dtype=np.float64),
+    )
