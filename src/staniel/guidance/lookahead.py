@@ -40,7 +40,7 @@ class _Memory:
     sightlines: Sightlines
     regions: Regions
     rates: Floats
-    choice: NDArray[np.int64]
+    sequence: Floats
     planned: float = -math.inf
     looks: list[tuple[float, ...]] = field(default_factory=list)
 
@@ -73,8 +73,9 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
         config.width,
         config.discount,
         config.effort,
+        config.polish,
     )
-    choice, _ = plan(
+    sequence, _ = plan(
         pursuit.chart.walls,
         memory.sightlines,
         eye,
@@ -84,13 +85,13 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
         np.array(pursuit.pose),
         places,
         weights,
-        _left_over(memory, pursuit.time, config.banks // 2),
+        _left_over(memory, pursuit.time),
     )
-    if not choice.size:
+    if not sequence.size:
         raise NoFeasibleFlight(f"no flight of {config.horizon} s is free from {pursuit.pose}")
-    memory.choice, memory.planned = choice, pursuit.time
-    sequence = tuple(banks[choice[:MAX_BANKS]].tolist())
-    return FlyBanks(sequence, _HOLD, airframe.speed, airframe.altitude)
+    memory.sequence, memory.planned = sequence, pursuit.time
+    held = tuple(sequence[:MAX_BANKS].tolist())
+    return FlyBanks(held, _HOLD, airframe.speed, airframe.altitude)
 
 
 def _memory(pursuit: Pursuit) -> _Memory:
@@ -100,17 +101,16 @@ def _memory(pursuit: Pursuit) -> _Memory:
     if not isinstance(memory, _Memory):
         lines = new_sightlines(altitude, pursuit.camera.target_height)
         regions, rates = _regions(pursuit.risk, pursuit.config.lookahead.exposure)
-        choice = np.zeros(pursuit.config.lookahead.horizon, dtype=np.int64)
-        memory = pursuit.memory["lookahead"] = _Memory(lines, regions, rates, choice)
+        sequence = np.zeros(pursuit.config.lookahead.horizon)
+        memory = pursuit.memory["lookahead"] = _Memory(lines, regions, rates, sequence)
     return memory
 
 
-def _left_over(memory: _Memory, time: float, straight: int) -> NDArray[np.int64]:
+def _left_over(memory: _Memory, time: float) -> Floats:
     """What is left of the last plan, level at its end; level flight where there is none."""
-    gone = time - memory.planned
-    steps = round(gone / _HOLD) if gone < memory.choice.size * _HOLD else memory.choice.size
-    rest = memory.choice[steps:]
-    return np.concatenate((rest, np.full(memory.choice.size - rest.size, straight)))
+    size, gone = memory.sequence.size, time - memory.planned
+    rest = memory.sequence[min(round(min(gone, size) / _HOLD), size) :]
+    return np.concatenate((rest, np.zeros(size - rest.size)))
 
 
 def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:

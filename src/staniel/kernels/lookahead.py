@@ -65,6 +65,8 @@ class Search(NamedTuple):
     """What a second later is worth of one now."""
     effort: float
     """Seconds of sight that a second at a bank of one radian costs, by its square."""
+    polish: int
+    """How often the best sequences are gone through for small changes."""
 
 
 def no_regions() -> tuple[Regions, Floats]:
@@ -326,10 +328,84 @@ def _hold(
 
 
 @njit(cache=True, error_model="numpy")
-def _chosen(
-    rows: Floats, count: int, must: int, width: int, center: Floats, worth: float
-) -> Indices:
-    """The `width` worthiest of `count` rows, the first the best; `must` is among them if it is one.
+def _flown(
+    walls: Walls,
+    memory: Sightlines,
+    eye: Eye,
+    search: Search,
+    regions: Regions,
+    rates: Floats,
+    slots: Indices,
+    places: Floats,
+    weights: Floats,
+    speed: float,
+    sequence: Floats,
+    rows: Floats,
+    level: int,
+) -> float:
+    """Rank of a sequence of banks: its worth, less what the distance at its end costs.
+
+    ``rows[:level + 1]`` are the states before each bank; those after are filled in.
+    """
+    for k in range(level, sequence.size):
+        x, y, heading, bank, worth = _hold(
+            walls, memory, eye, search, regions, rates, slots, places, weights,
+            k * search.samples, speed, rows[k], sequence[k],
+        )  # fmt: skip
+        if worth == -math.inf:
+            return -math.inf
+        rows[k + 1, 0], rows[k + 1, 1], rows[k + 1, 2] = x, y, heading
+        rows[k + 1, 3], rows[k + 1, 4] = bank, worth
+    end, t = rows[sequence.size], sequence.size * search.samples
+    away = math.hypot(end[0] - places[t, :, 0].mean(), end[1] - places[t, :, 1].mean())
+    far = _PULL * max(0.0, away - _NEAR)
+    return float(end[4] - search.discount ** (t * search.step) * far)
+
+
+@njit(cache=True, error_model="numpy")
+def _polished(
+    walls: Walls,
+    memory: Sightlines,
+    eye: Eye,
+    search: Search,
+    regions: Regions,
+    rates: Floats,
+    slots: Indices,
+    places: Floats,
+    weights: Floats,
+    start: Floats,
+    sequence: Floats,
+) -> float:
+    """Change one bank after the other a little, in place, where that is worth more; the worth."""
+    rows = np.zeros((sequence.size + 1, 5))
+    rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3] = start[0], start[1], start[3], start[4]
+    limit, size = search.banks[-1], search.banks[1] - search.banks[0]
+    best = _flown(
+        walls, memory, eye, search, regions, rates, slots, places, weights,
+        start[5], sequence, rows, 0,
+    )  # fmt: skip
+    trial = rows.copy()
+    for _ in range(search.polish):
+        size *= 0.5
+        for level in range(sequence.size):
+            for side in (-1.0, 1.0):
+                kept = sequence[level]
+                sequence[level] = min(max(kept + side * size, -limit), limit)
+                trial[level] = rows[level]
+                worth = _flown(
+                    walls, memory, eye, search, regions, rates, slots, places, weights,
+                    start[5], sequence, trial, level,
+                )  # fmt: skip
+                if worth > best:
+                    best, rows[level:] = worth, trial[level:]
+                else:
+                    sequence[level] = kept
+    return best
+
+
+@njit(cache=True, error_model="numpy")
+def _chosen(rows: Floats, count: int, width: int, center: Floats, worth: float) -> Indices:
+    """The `width` worthiest of `count` rows, the first the best.
 
     Flights far from where the target may be see nothing yet, all alike: the nearer is preferred.
     """
@@ -337,13 +413,70 @@ def _chosen(
     for c in range(count):
         away = math.hypot(rows[c, 0] - center[0], rows[c, 1] - center[1])
         ranks[c] = worth * _PULL * max(0.0, away - _NEAR) - rows[c, 4]
-    order = np.argsort(ranks, kind="mergesort")[:width]
-    if must >= 0:
-        for c in range(order.size):
-            if order[c] == must:
-                return order
-        order[order.size - 1] = must
-    return order
+    return np.argsort(ranks, kind="mergesort")[:width]
+
+
+@njit(cache=True, error_model="numpy")
+def _beam(
+    walls: Walls,
+    memory: Sightlines,
+    eye: Eye,
+    search: Search,
+    regions: Regions,
+    rates: Floats,
+    slots: Indices,
+    places: Floats,
+    weights: Floats,
+    start: Floats,
+) -> Floats:
+    """The best sequence of the search's banks that a beam finds; empty where none may be flown."""
+    kinds, size = search.banks.size, 64
+    while size < 3 * search.width * kinds:
+        size *= 2
+    table, keys = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
+    parents = np.zeros((search.holds, search.width), dtype=np.int64)
+    choices = np.zeros((search.holds, search.width), dtype=np.int64)
+    grown = np.empty((search.width * kinds, 5))
+    origin = np.empty((search.width * kinds, 2), dtype=np.int64)
+    rows, center = np.zeros((1, 5)), np.empty(2)
+    rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3] = start[0], start[1], start[3], start[4]
+    for level in range(search.holds):
+        table[:] = -1
+        count, first = 0, level * search.samples
+        for i in range(rows.shape[0]):
+            for k in range(kinds):
+                x, y, heading, bank, worth = _hold(
+                    walls, memory, eye, search, regions, rates, slots, places, weights,
+                    first, start[5], rows[i], search.banks[k],
+                )  # fmt: skip
+                if worth == -math.inf:
+                    continue
+                key = _key(x, y, heading, bank)
+                at = _entry(table, keys, key)
+                c = table[at]
+                if c < 0:
+                    c, table[at], keys[at] = count, count, key
+                    count += 1
+                elif grown[c, 4] >= worth:
+                    continue
+                grown[c, 0], grown[c, 1], grown[c, 2] = x, y, heading
+                grown[c, 3], grown[c, 4] = bank, worth
+                origin[c, 0], origin[c, 1] = i, k
+        if count == 0:
+            return np.zeros(0)
+        t = first + search.samples
+        center[0], center[1] = places[t, :, 0].mean(), places[t, :, 1].mean()
+        order = _chosen(grown, count, search.width, center, search.discount ** (t * search.step))
+        rows = np.empty((order.size, 5))
+        for q in range(order.size):
+            c = order[q]
+            parents[level, q], choices[level, q] = origin[c, 0], origin[c, 1]
+            for e in range(5):
+                rows[q, e] = grown[c, e]
+    best, q = np.empty(search.holds), 0
+    for level in range(search.holds - 1, -1, -1):
+        best[level], q = search.banks[choices[level, q]], parents[level, q]
+    return best
 
 
 @njit(cache=True, error_model="numpy")
@@ -357,9 +490,9 @@ def plan(
     start: Floats,
     places: Floats,
     weights: Floats,
-    previous: Indices,
-) -> tuple[Indices, float]:
-    r"""The sequence of banks that is worth most.
+    previous: Floats,
+) -> tuple[Floats, float]:
+    r"""The sequence of banks that is worth most: the beam's best, or the last plan's rest, polished.
 
     Parameters
     ----------
@@ -378,77 +511,36 @@ def plan(
         Where the target may be, now and after each step of the search.
     weights : (t + 1, m) float array
         What seeing it there is worth.
-    previous : (holds,) int array
-        A sequence that the search has to beat, by numbers of banks: what is left of the last plan.
+    previous : (holds,) float array [rad]
+        A sequence that the search has to beat: what is left of the last plan.
 
     Returns
     -------
-    choice : (holds,) int array
-        Numbers of the banks; empty where every sequence ends in a building or a no-fly region.
+    banks : (holds,) float array [rad]
+        Empty where every sequence ends in a building or a no-fly region.
     worth : float [s]
-        Expected discounted seconds of sight, less exposure and effort:
-        :math:`\sum_t \gamma^{t} (\sum_j w_{tj} [j\ seen] - cost_t)\,\Delta t`.
+        Expected discounted seconds of sight, less exposure and effort,
+        :math:`\sum_t \gamma^{t} (\sum_j w_{tj} [j\ seen] - cost_t)\,\Delta t`, and less what the
+        distance at the end costs.
     """
-    steps, m, kinds = places.shape[0] - 1, places.shape[1], search.banks.size
+    steps, m = places.shape[0] - 1, places.shape[1]
     slots = np.empty((steps + 1, m), dtype=np.int64)
     for t in range(steps + 1):
         for j in range(m):
             slots[t, j] = slot_of(memory, places[t, j, 0], places[t, j, 1])
-    size = 64
-    while size < 3 * search.width * kinds:
-        size *= 2
-    table, keys = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-    parents = np.zeros((search.holds, search.width), dtype=np.int64)
-    choices = np.zeros((search.holds, search.width), dtype=np.int64)
-    grown = np.empty((search.width * kinds, 5))
-    origin = np.empty((search.width * kinds, 2), dtype=np.int64)
-    rows = np.zeros((1, 5))
-    rows[0, 0], rows[0, 1], rows[0, 2], rows[0, 3] = start[0], start[1], start[3], start[4]
-    known, center = 0, np.empty(2)
-    for level in range(search.holds):
-        table[:] = -1
-        count, must, first = 0, -1, level * search.samples
-        for i in range(rows.shape[0]):
-            for k in range(kinds):
-                x, y, heading, bank, worth = _hold(
-                    walls, memory, eye, search, regions, rates, slots, places, weights,
-                    first, start[5], rows[i], search.banks[k],
-                )  # fmt: skip
-                if worth == -math.inf:
-                    continue
-                key = _key(x, y, heading, bank)
-                at = _entry(table, keys, key)
-                c = table[at]
-                old = i == known and k == previous[level]
-                if c < 0:
-                    c, table[at], keys[at] = count, count, key
-                    count += 1
-                elif grown[c, 4] >= worth:
-                    must = c if old else must
-                    continue
-                must = c if old else must
-                grown[c, 0], grown[c, 1], grown[c, 2] = x, y, heading
-                grown[c, 3], grown[c, 4] = bank, worth
-                origin[c, 0], origin[c, 1] = i, k
-        if count == 0:
-            return np.zeros(0, dtype=np.int64), -math.inf
-        t = first + search.samples
-        center[0], center[1] = places[t, :, 0].mean(), places[t, :, 1].mean()
-        order = _chosen(
-            grown, count, must, search.width, center, search.discount ** (t * search.step)
+    best, worth = previous.copy(), -math.inf
+    for sequence in (
+        previous.copy(),
+        _beam(walls, memory, eye, search, regions, rates, slots, places, weights, start),
+    ):
+        if sequence.size == 0:
+            continue
+        value = _polished(
+            walls, memory, eye, search, regions, rates, slots, places, weights, start, sequence
         )
-        rows, known = np.empty((order.size, 5)), -1
-        for q in range(order.size):
-            c = order[q]
-            known = q if c == must else known
-            parents[level, q], choices[level, q] = origin[c, 0], origin[c, 1]
-            for e in range(5):
-                rows[q, e] = grown[c, e]
-    best = np.empty(search.holds, dtype=np.int64)
-    q = 0
-    for level in range(search.holds - 1, -1, -1):
-        best[level], q = choices[level, q], parents[level, q]
-    return best, rows[0, 4]
+        if value > worth:
+            best, worth = sequence, value
+    return (best if worth > -math.inf else np.zeros(0)), worth
 
 
 def warm() -> None:
@@ -458,8 +550,8 @@ def warm() -> None:
     poses = roll_out(start, np.zeros(2), 1.0, 0.0, 2, 0.5, 3.0, 1.0)
     places, weights = np.zeros((3, 1, 2)), np.ones((3, 1))
     shade(walls, eye, poses, places, weights, 1.0, 0.9)
-    search = Search(np.array([-0.5, 0.5]), 1, 2, 0.5, 3.0, 1.0, 4, 0.95, 0.0)
+    search = Search(np.array([-0.5, 0.5]), 1, 2, 0.5, 3.0, 1.0, 4, 0.95, 0.0, 1)
     plan(
         walls, memory, eye, search, *no_regions(), start, places, weights,
-        np.zeros(1, dtype=np.int64),
+        np.zeros(1),
     )  # fmt: skip
