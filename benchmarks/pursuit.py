@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 from staniel.city import City
 from staniel.guidance import lookahead
 from staniel.guidance import pursuit as policies
-from staniel.kernels.lookahead import Eye, Search, no_regions, plan, roll_out
+from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookout import Eye, no_regions, roll_out
 from staniel.kernels.sightlines import new_sightlines
 from staniel.kernels.visibility import seen_by
 from staniel.kernels.walls import inside
@@ -51,7 +52,8 @@ class Case(NamedTuple):
     @property
     def title(self) -> str:
         """For tables."""
-        return f"{self.aircraft} aircraft, {self.height:g} x roof, {self.speed:g} m/s, loss {self.loss:g}"
+        who = f"{self.aircraft} aircraft at {self.height:g} x the tallest roof"
+        return f"{who}, target {self.speed:g} m/s, {self.loss:.0%} of the messages lost"
 
 
 class Flown(NamedTuple):
@@ -226,7 +228,8 @@ def row(name: str, flights: Sequence[Flown]) -> str:
     """A line of the table."""
     return (
         f"  {name:12s} hidden {mean(flights):6.1%} (1 s: {mean(flights, 'hidden_whole'):6.1%})"
-        f"  longest gap {mean(flights, 'longest'):5.1f} s, worst {max(f.longest for f in flights):5.1f} s"
+        f"  longest gap {mean(flights, 'longest'):5.1f} s,"
+        f" worst {max(flight.longest for flight in flights):5.1f} s"
         f"  strikes {sum(f.strikes for f in flights)}"
     )
 

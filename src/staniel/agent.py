@@ -21,7 +21,7 @@ from staniel.datatypes.message import Heartbeat, Message, Point, Report
 from staniel.datatypes.risk import RiskRegion
 from staniel.guidance import (
     GuidanceConfig,
-    NoFeasibleFlight,
+    NoFeasibleFlightError,
     Partner,
     Pursuit,
     loiter,
@@ -213,7 +213,7 @@ class Agent:
         """What the policy commands, or a loiter that is safe, and then the role says so."""
         try:
             return self._pursue(self._pursuit(time, pose, track)), role
-        except NoFeasibleFlight:
+        except NoFeasibleFlightError:
             return safe_loiter(pose, self._briefing.airframe, self._briefing.chart), "loiter"
 
     def _pursuit(self, time: float, pose: Pose, track: TrackEstimate) -> Pursuit:

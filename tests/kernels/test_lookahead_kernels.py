@@ -11,7 +11,8 @@ from staniel.city import City
 from staniel.kernels.flight import BANKS, COMMAND_WIDTH, fly
 from staniel.kernels.footprint import BODY
 from staniel.kernels.forecast import discredit, forecast
-from staniel.kernels.lookahead import Eye, Search, no_regions, plan, roll_out, shade, watch
+from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookout import Eye, no_regions, roll_out, shade, watch
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import AIR, GROUND, SLOTS, new_sightlines, sees, slot_of
 from staniel.kernels.walls import inside_points, line_of_sight

@@ -17,6 +17,7 @@ EXTRAS = {
     "gusts": {"wind": {"gusts": True}},
     "lidar": {"lidar": {"mount": "scanner"}},
     "gimbal": {"camera": {"mount": "gimbal"}},
+    "lookahead": {"guidance": {"pursuit": "lookahead"}, "cooperation": {"helpers": 1}},
 }
 
 

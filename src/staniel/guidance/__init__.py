@@ -5,7 +5,7 @@ from staniel.guidance.loiter import loiter, safe_loiter
 from staniel.guidance.lookahead import lookahead
 from staniel.guidance.orbit import best_radius, orbit
 from staniel.guidance.pursuit import (
-    NoFeasibleFlight,
+    NoFeasibleFlightError,
     Partner,
     Policy,
     Pursuit,
@@ -18,7 +18,7 @@ from staniel.guidance.pursuit import (
 __all__ = [
     "GuidanceConfig",
     "LookaheadConfig",
-    "NoFeasibleFlight",
+    "NoFeasibleFlightError",
     "Partner",
     "Policy",
     "Pursuit",

@@ -1,6 +1,7 @@
 """Circling a place, turning the way that is nearer; and a loiter that nothing stands in."""
 
 import math
+from itertools import pairwise
 
 from staniel.city import City
 from staniel.datatypes.belief import Pose
@@ -101,7 +102,7 @@ def safe_loiter(pose: Pose, airframe: Airframe, chart: City) -> FlyOrbit:
         ring = [(x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles]
         return sum(
             not line_of_sight(chart.walls, *here, pose.z, *there, pose.z)
-            for here, there in zip(ring, ring[1:], strict=False)
+            for here, there in pairwise(ring)
         )
 
     turn = min((1, -1), key=strikes)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from staniel.datatypes.command import FlyBanks
 from staniel.datatypes.risk import RiskRegion
-from staniel.guidance.pursuit import NoFeasibleFlight, Pursuit, pursuit_policy
+from staniel.guidance.pursuit import NoFeasibleFlightError, Pursuit, pursuit_policy
 from staniel.kernels.flight import MAX_BANKS
 from staniel.kernels.forecast import discredit, forecast
-from staniel.kernels.lookahead import Eye, Search, plan, roll_out, shade
+from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookout import Eye, roll_out, shade
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import Sightlines, new_sightlines
 
@@ -51,7 +52,7 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
 
     Raises
     ------
-    NoFeasibleFlight
+    NoFeasibleFlightError
         Every sequence meets a building of the chart or a no-fly region.
     """
     config, airframe, camera = pursuit.config.lookahead, pursuit.airframe, pursuit.camera
@@ -88,7 +89,7 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
         _left_over(memory, pursuit.time),
     )
     if not sequence.size:
-        raise NoFeasibleFlight(f"no flight of {config.horizon} s is free from {pursuit.pose}")
+        raise NoFeasibleFlightError(f"no flight of {config.horizon} s is free from {pursuit.pose}")
     memory.sequence, memory.planned = sequence, pursuit.time
     held = tuple(sequence[:MAX_BANKS].tolist())
     return FlyBanks(held, _HOLD, airframe.speed, airframe.altitude)

@@ -26,7 +26,7 @@ from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.loiter import loiter
 
 __all__ = [
-    "NoFeasibleFlight",
+    "NoFeasibleFlightError",
     "Partner",
     "Policy",
     "Pursuit",
@@ -37,7 +37,7 @@ __all__ = [
 ]
 
 
-class NoFeasibleFlight(StanielError):
+class NoFeasibleFlightError(StanielError):
     """What a policy raises when it finds no flight that is safe: its agent then loiters."""
 
 

@@ -70,7 +70,7 @@ def new_sightlines(altitude: float, target_height: float) -> Sightlines:
 @njit(cache=True, error_model="numpy")
 def slot_of(memory: Sightlines, x: float, y: float) -> int:
     """Slot of the ground cell around (x, y); takes it from another cell where need be."""
-    i, j = int(math.floor(x / GROUND)) + _FAR, int(math.floor(y / GROUND)) + _FAR
+    i, j = math.floor(x / GROUND) + _FAR, math.floor(y / GROUND) + _FAR
     slot = (i & _MASK) * SLOTS + (j & _MASK)
     number = (i << 25) + j
     if memory.owners[slot] != number:
@@ -85,8 +85,8 @@ def sees(memory: Sightlines, walls: Walls, slot: int, x: float, y: float) -> boo
     """Whether the slot's place is in free sight from around (x, y) at the flight height."""
     px, py = memory.places[slot, 0], memory.places[slot, 1]
     low, high = memory.target_height, memory.altitude
-    i = int(math.floor((x - px) * (1.0 / AIR)))
-    j = int(math.floor((y - py) * (1.0 / AIR)))
+    i = math.floor((x - px) * (1.0 / AIR))
+    j = math.floor((y - py) * (1.0 / AIR))
     if not (-_HALF <= i < _HALF and -_HALF <= j < _HALF):
         return bool(line_of_sight(walls, px, py, low, x, y, high))
     cell = (i + _HALF) * _WIDE + j + _HALF

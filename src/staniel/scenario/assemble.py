@@ -96,12 +96,12 @@ def assemble(scenario: Scenario, city: City) -> Mission:
 def kernels_of(scenario: Scenario) -> list[str]:
     """Kernel modules that this scenario calls beside those that every mission does."""
     uses = {
-        "forecast": scenario.guidance.pursuit == "lookahead",
         "gusts": scenario.wind.gusts,
         "lidar": scenario.lidar.mount != "none",
-        "lookahead": scenario.guidance.pursuit == "lookahead",
         "risk": scenario.risk.regions or scenario.risk.carried.radius,
         "roads": scenario.vehicles.kind == "roads",
         "replay": scenario.vehicles.kind == "replay",
     }
-    return [name for name, used in uses.items() if used]
+    searched = scenario.guidance.pursuit == "lookahead"
+    pursuit = ["forecast", "lookahead", "lookout", "sightlines"] if searched else []
+    return [*(name for name, used in uses.items() if used), *pursuit]
