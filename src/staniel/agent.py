@@ -7,18 +7,28 @@ What flies knows only what it saw, what it was told, and what it was ordered.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from staniel.city import City
-from staniel.cooperation import Allocation, CooperationConfig, SearchMap, Task
+from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMap, Task
 from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import Command, FlyLine
+from staniel.datatypes.command import Command, FlyBanks, FlyLine
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
-from staniel.guidance import GuidanceConfig, KnownDangers, Pursuit, loiter, pursuit_policy_named
+from staniel.guidance import (
+    GuidanceConfig,
+    KnownDangers,
+    NoFeasibleFlightError,
+    Partner,
+    Pursuit,
+    loiter,
+    pursuit_policy_named,
+    safe_loiter,
+)
 from staniel.kernels.dubins import shortest
 from staniel.tracking import Tracker, TrackingConfig
 
@@ -73,6 +83,7 @@ class Agent:
             turn_radius=airframe.min_turn_radius,
             step=clock.decision_step,
         )
+        self._helping = Helping(id, briefing.cooperation)
         self._search = SearchMap(
             briefing.chart, airframe, briefing.camera, cell=briefing.cooperation.search_cell
         )
@@ -81,6 +92,7 @@ class Agent:
         self.dangers = KnownDangers(
             briefing.risk, briefing.carried, speed=briefing.tracking.max_speed
         )
+        self._memory: dict[str, Any] = {}
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
         self.belief = Belief((), "search", None, (0.0, 0.0))
@@ -114,7 +126,8 @@ class Agent:
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
-        outbox.append(self._allocation.heartbeat(role, goal))
+        plan = command if role in ("pursue", "help") and isinstance(command, FlyBanks) else None
+        outbox.append(self._allocation.heartbeat(role, goal, self._helping.target, plan))
         held = self._allocation.holding
         self.belief = Belief(self._tracker.estimates, role, None if held is None else held.id, goal)
         return command, outbox
@@ -136,6 +149,8 @@ class Agent:
         )
         for old, new in self._allocation.renames:
             self._tracker.rename(old, new)
+        free = self._allocation.holding is None
+        self._helping.step(percept.time, percept.pose, free, inbox)
         return outbox
 
     def _tasks(self, percept: Percept, tracks: list[TrackEstimate]) -> list[Task]:
@@ -180,11 +195,13 @@ class Agent:
                 self._seen_holding = time
                 self._last_place = (held.position, time)
                 self._search.forget_goal()
-                return self._pursue(self._pursuit(time, pose, track)), "pursue", held.position
+                return *self._chase(time, pose, track, "pursue"), held.position
             since = max(self._seen_holding, held.since)
             if self._tracker_lost(held.id) or time - since > guidance.recover_time:
                 outbox.append(self._allocation.give_up())
             self._last_place = (held.position, since)
+        if self._helping.target is not None:
+            return self._help(time, pose, self._helping.target)
         if self._last_place is not None:
             place, since = self._last_place
             if time - since <= guidance.recover_time:
@@ -196,6 +213,28 @@ class Agent:
         start, goal = self._search.leg(time, pose, others)
         airframe = self._briefing.airframe
         return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
+
+    def _help(self, time: float, pose: Pose, target: TrackId) -> tuple[Command, str, Point]:
+        """Pursue what another holds; circle where it is said to be until an own track says it."""
+        self._last_place = None
+        self._search.forget_goal()
+        place, track = self._helping.position, self._track_named(target)
+        if track is None:
+            return (
+                loiter(pose, place, self._briefing.airframe, self._briefing.guidance),
+                "help",
+                place,
+            )
+        return *self._chase(time, pose, track, "help"), place
+
+    def _chase(
+        self, time: float, pose: Pose, track: TrackEstimate, role: str
+    ) -> tuple[Command, str]:
+        """What the policy commands, or a loiter that is safe, and then the role says so."""
+        try:
+            return self._pursue(self._pursuit(time, pose, track)), role
+        except NoFeasibleFlightError:
+            return safe_loiter(pose, self._briefing.airframe, self._briefing.chart), "loiter"
 
     def _pursuit(self, time: float, pose: Pose, track: TrackEstimate) -> Pursuit:
         briefing = self._briefing
@@ -210,6 +249,11 @@ class Agent:
             chart=briefing.chart,
             config=briefing.guidance,
             dangers=self.dangers.at(time, self._tracker.estimates),
+            partners=tuple(
+                Partner(beat.time, beat.pose, beat.plan)
+                for beat in self._helping.partners(track.id)
+            ),
+            memory=self._memory,
         )
 
     def _track_named(self, name: TrackId) -> TrackEstimate | None:

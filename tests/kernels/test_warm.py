@@ -25,6 +25,7 @@ EXTRAS = {
     "lidar": {"lidar": {"mount": "scanner"}},
     "gimbal": {"camera": {"mount": "gimbal"}},
     "threats": {"risk": DANGERS},
+    "lookahead": {"guidance": {"pursuit": "lookahead"}, "cooperation": {"helpers": 1}},
 }
 
 

@@ -2,6 +2,7 @@
 
 from staniel.cooperation.auction import Allocation, Holding, Task
 from staniel.cooperation.config import CooperationConfig
+from staniel.cooperation.helping import Helping
 from staniel.cooperation.search import SearchMap
 
-__all__ = ["Allocation", "CooperationConfig", "Holding", "SearchMap", "Task"]
+__all__ = ["Allocation", "CooperationConfig", "Helping", "Holding", "SearchMap", "Task"]

@@ -22,6 +22,7 @@ from typing import Any
 
 from staniel.cooperation.config import CooperationConfig
 from staniel.datatypes.belief import Pose, TrackId
+from staniel.datatypes.command import FlyBanks
 from staniel.datatypes.message import (
     Announce,
     Award,
@@ -159,7 +160,13 @@ class Allocation:
         self._open_auctions()
         return self._out
 
-    def heartbeat(self, role: str, goal: Point) -> Heartbeat:
+    def heartbeat(
+        self,
+        role: str,
+        goal: Point,
+        helps: TrackId | None = None,
+        plan: FlyBanks | None = None,
+    ) -> Heartbeat:
         """The message that tells the others where the agent is and renews its lease."""
         holding = self.holding
         task = None if holding is None else self._tasks.get(holding.id)
@@ -177,6 +184,8 @@ class Allocation:
             if holding is None
             else (holding.position if task is None else task.position),
             cost=self._said_cost,
+            helps=helps,
+            plan=plan,
         )
 
     def give_up(self) -> Release:

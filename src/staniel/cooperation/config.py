@@ -22,3 +22,6 @@ class CooperationConfig(Config):
         12.0, gt=0.0, description="two reports this close are one target [m]"
     )
     search_cell: float = Field(20.0, gt=0.0, description="cell of the search map [m]")
+    helpers: int = Field(
+        0, ge=0, le=10, description="free aircraft that join each one which holds a target"
+    )

@@ -158,7 +158,8 @@ class Belief:
     ----------
     tracks : sequence of TrackEstimate
     role : str
-        ``"search"``, ``"pursue"`` or ``"recover"``.
+        ``"search"``, ``"pursue"``, ``"help"``, ``"recover"``, or ``"loiter"`` where
+        its policy found no flight that is safe.
     target : TrackId or None
         The track it is responsible for.
     goal : (float, float) [m]

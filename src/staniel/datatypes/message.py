@@ -7,6 +7,7 @@ first two a receiver recognises a copy. The auction's words are those of thesis 
 from dataclasses import dataclass
 
 from staniel.datatypes.belief import Pose, Sighting, TrackId
+from staniel.datatypes.command import FlyBanks
 from staniel.datatypes.threats import Threats
 
 __all__ = [
@@ -42,7 +43,11 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
-    """I am alive, here, doing this. A held target's award is a lease that this renews."""
+    """I am alive, here, doing this. A held target's award is a lease that this renews.
+
+    `helps` is the target that the sender watches beside its holder; `plan` is what it is about to
+    fly from `pose` on, where it pursues a target by a sequence of banks.
+    """
 
     pose: Pose
     role: str
@@ -50,6 +55,8 @@ class Heartbeat(Message):
     target: TrackId | None
     target_position: Point | None
     cost: float
+    helps: TrackId | None = None
+    plan: FlyBanks | None = None
 
 
 @dataclass(frozen=True, slots=True)

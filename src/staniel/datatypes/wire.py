@@ -9,7 +9,8 @@ head           16: kind 1, length 1, sender 2, sequence 4, time 8; every message
 track name     14: born 8, founder 2, serial 4
 point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
-heartbeat      head, pose, role 1, goal, track name, point, cost
+heartbeat      head, pose, role 1, goal, track name, point, cost; where it helps a track name, and
+               where it tells its plan hold 4, count 1, speed 4 and for each bank 2
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
 warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
                each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,
@@ -76,6 +77,9 @@ def wire_size(message: Message) -> int:
     elif isinstance(message, Warn):
         size += CARRIER * len(message.threats.carriers)
         size += sum(map(_region_size, message.threats.regions))
+    elif isinstance(message, Heartbeat):
+        size += _NAME if message.helps is not None else 0
+        size += 9 + 2 * len(message.plan.banks) if message.plan is not None else 0
     return size
 
 

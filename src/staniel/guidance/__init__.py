@@ -1,6 +1,6 @@
 """How to fly it: paths and how to follow them, loiters and pursuit policies, known dangers."""
 
-from staniel.guidance.config import GuidanceConfig
+from staniel.guidance.config import GuidanceConfig, LookaheadConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers, KnownDangers
 from staniel.guidance.dubins import Paths, Word, shortest
 from staniel.guidance.dubins_wind import WindPath, shortest_in_wind
@@ -14,8 +14,12 @@ from staniel.guidance.following import (
     line_course,
     orbit_course,
 )
-from staniel.guidance.loiter import loiter
+from staniel.guidance.loiter import loiter, safe_loiter
+from staniel.guidance.lookahead import lookahead
+from staniel.guidance.orbit import best_radius, orbit
 from staniel.guidance.pursuit import (
+    NoFeasibleFlightError,
+    Partner,
     Policy,
     Pursuit,
     carrot,
@@ -30,11 +34,15 @@ __all__ = [
     "Follower",
     "GuidanceConfig",
     "KnownDangers",
+    "LookaheadConfig",
+    "NoFeasibleFlightError",
+    "Partner",
     "Paths",
     "Policy",
     "Pursuit",
     "WindPath",
     "Word",
+    "best_radius",
     "carrot",
     "carrot_line",
     "carrot_loiter",
@@ -43,10 +51,13 @@ __all__ = [
     "heading_for_course",
     "line_course",
     "loiter",
+    "lookahead",
+    "orbit",
     "orbit_course",
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",
+    "safe_loiter",
     "shortest",
     "shortest_in_wind",
 ]

@@ -7,7 +7,27 @@ from pydantic import Field
 
 from staniel.datatypes.config import Config
 
-__all__ = ["GuidanceConfig"]
+__all__ = ["GuidanceConfig", "LookaheadConfig"]
+
+
+class LookaheadConfig(Config):
+    """The search of the policy `lookahead`, see docs/pursuit.md."""
+
+    horizon: int = Field(12, ge=2, le=60, description="how far ahead flights are looked at [s]")
+    banks: int = Field(5, ge=3, le=15, description="different banks, evenly from limit to limit")
+    width: int = Field(40, ge=1, le=5000, description="flights kept after each second")
+    polish: int = Field(2, ge=0, le=10, description="times that the best are gone through")
+    particles: int = Field(16, ge=1, le=200, description="places that stand for the belief")
+    discount: float = Field(0.95, gt=0.0, le=1.0, description="worth of sight a second later")
+    effort: float = Field(
+        0.0, ge=0.0, le=10.0, description="sight that a second of banking by 1 rad costs [s]"
+    )
+    exposure: float = Field(
+        1.0, ge=0.0, le=1e6, description="sight that one unit of exposure to a threat costs [s]"
+    )
+    trust: float = Field(
+        0.9, ge=0.0, le=1.0, description="that a partner sees what its plan would show"
+    )
 
 
 class GuidanceConfig(Config):
@@ -21,6 +41,9 @@ class GuidanceConfig(Config):
     loiter_entry: float = Field(
         1.5, ge=1.0, description="loiter within this many radii of the target"
     )
+    orbit_radius: float | None = Field(
+        None, gt=0.0, le=1e4, description="of the policy orbit; not set: where it sees best [m]"
+    )
     recover_time: float = Field(
         25.0, ge=0.0, description="loiter on a lost target's last place [s]"
     )
@@ -30,6 +53,7 @@ class GuidanceConfig(Config):
     approach_deg: float = Field(
         60.0, gt=0.0, le=90.0, description="vector field: greatest angle to a line it joins [deg]"
     )
+    lookahead: LookaheadConfig = LookaheadConfig()
 
     @property
     def approach(self) -> float:

@@ -10,20 +10,54 @@ and names it in the scenario: ``guidance.pursuit = "mine"``.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
 from staniel.datatypes.belief import Pose, TrackEstimate
-from staniel.datatypes.command import Command, FlyLine
+from staniel.datatypes.command import Command, FlyBanks, FlyLine
 from staniel.datatypes.equipment import Airframe, Camera
+from staniel.errors import StanielError
 from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers
 from staniel.guidance.loiter import loiter
 
-__all__ = ["Policy", "Pursuit", "carrot", "pursuit_names", "pursuit_policy", "pursuit_policy_named"]
+__all__ = [
+    "NoFeasibleFlightError",
+    "Partner",
+    "Policy",
+    "Pursuit",
+    "carrot",
+    "pursuit_names",
+    "pursuit_policy",
+    "pursuit_policy_named",
+]
+
+
+class NoFeasibleFlightError(StanielError):
+    """What a policy raises when it finds no flight that is safe: its agent then loiters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Partner:
+    """Another aircraft on the same target, as it said itself.
+
+    Attributes
+    ----------
+    time : float [s]
+        When it said so.
+    pose : Pose
+        Then.
+    plan : FlyBanks or None
+        What it was about to fly from then on; None where it did not say.
+    """
+
+    time: float
+    pose: Pose
+    plan: FlyBanks | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +83,10 @@ class Pursuit:
     dangers : Dangers
         What the agent knows of threats and no-fly regions: the expected exposure rate at a place,
         and whether it is forbidden to be there.
+    partners : tuple of Partner
+        Other aircraft on the same target, as of the last message heard of each.
+    memory : dict
+        The agent's own, handed in again at its next step: what a policy wants to keep is there.
     """
 
     time: float
@@ -61,6 +99,8 @@ class Pursuit:
     chart: City
     config: GuidanceConfig
     dangers: Dangers = NO_DANGERS
+    partners: tuple[Partner, ...] = ()
+    memory: dict[str, Any] = field(default_factory=dict)
 
 
 Policy = Callable[[Pursuit], Command]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from staniel.kernels.following import line_rate, orbit_rate, wrapped
 
-__all__ = ["BANKS", "COMMAND_WIDTH", "LINE", "MAX_BANKS", "ORBIT", "fly", "warm"]
+__all__ = ["BANKS", "COMMAND_WIDTH", "LINE", "MAX_BANKS", "ORBIT", "fly", "lagged", "warm"]
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def _over_ground(state: Array, east: float, north: float) -> tuple[float, float,
 
 
 @njit(cache=True, error_model="numpy")
-def _lagged(value: float, wanted: float, gain: float, max_rate: float, time: float) -> float:
+def lagged(value: float, wanted: float, gain: float, max_rate: float, time: float) -> float:
     """Exact solution of value' = clip(gain (wanted - value), ±max_rate) after `time`."""
     error = wanted - value
     linear = max_rate / gain
@@ -122,11 +122,11 @@ def _step(
     """One dynamics step of one aircraft, height excepted, in place; the wind is (east, north)."""
     wanted = _wanted_bank(state, command, limits, east, north, elapsed)
     bank, speed, heading = state[4], state[5], state[3]
-    middle_bank = _lagged(bank, wanted, limits[6], limits[5], 0.5 * dt)
-    end_bank = _lagged(bank, wanted, limits[6], limits[5], dt)
+    middle_bank = lagged(bank, wanted, limits[6], limits[5], 0.5 * dt)
+    end_bank = lagged(bank, wanted, limits[6], limits[5], dt)
     wanted_speed = min(max(command[1], limits[0]), limits[1])
-    middle_speed = _lagged(speed, wanted_speed, limits[8], limits[2], 0.5 * dt)
-    end_speed = _lagged(speed, wanted_speed, limits[8], limits[2], dt)
+    middle_speed = lagged(speed, wanted_speed, limits[8], limits[2], 0.5 * dt)
+    end_speed = lagged(speed, wanted_speed, limits[8], limits[2], dt)
     # Simpson's rule for heading, its companion for the half step, and Simpson again for the way.
     rate = _G / speed * math.tan(bank)
     middle_rate = _G / middle_speed * math.tan(middle_bank)

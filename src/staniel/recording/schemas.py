@@ -156,7 +156,7 @@ _COMMAND["properties"] |= {
 }
 _DECISION = _object(
     agent=_integer("aircraft"),
-    role=_string("search, pursue, recover, or down on the ground"),
+    role=_string("search, pursue, help, recover, loiter where no flight was safe, or down"),
     target=_or_null(_string("track it is responsible for, founder-serial")),
     goal=_POINT,
 )

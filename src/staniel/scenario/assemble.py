@@ -108,4 +108,6 @@ def kernels_of(scenario: Scenario) -> list[str]:
         "roads": scenario.vehicles.kind == "roads",
         "replay": scenario.vehicles.kind == "replay",
     }
-    return [name for name, used in uses.items() if used]
+    searched = scenario.guidance.pursuit == "lookahead"
+    pursuit = ["forecast", "lookahead", "lookout", "sightlines"] if searched else []
+    return [*(name for name, used in uses.items() if used), *pursuit]

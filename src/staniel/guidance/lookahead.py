@@ -1,0 +1,172 @@
+"""Flying where the target will be seen: many sequences of banks, scored by what they would show.
+
+Every decision step the belief is first corrected by the looks since the last sighting that showed
+nothing, then thinned, led through the streets of the chart, and searched for the flight from which
+most of it is seen over the horizon. Its first second is flown, and the rest is what the next search
+has to beat. What a partner on the same target will see by its last plan heard counts for little.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from staniel.datatypes.command import FlyBanks
+from staniel.datatypes.risk import RiskRegion, region_arrays
+from staniel.guidance.pursuit import NoFeasibleFlightError, Pursuit, pursuit_policy
+from staniel.kernels.flight import MAX_BANKS
+from staniel.kernels.forecast import discredit, forecast
+from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookout import Eye, roll_out, shade
+from staniel.kernels.risk import Regions
+from staniel.kernels.sightlines import Sightlines, new_sightlines
+
+__all__ = ["lookahead"]
+
+Floats = NDArray[np.float64]
+
+_HOLD = 1.0  # of each bank [s]
+_SAMPLES = 2  # looks in a hold
+_STEP = _HOLD / _SAMPLES
+_MISS = 0.1  # probability that a camera misses what it could see
+_MOST_LOOKS = 40  # in vain, that are remembered
+_OLDEST_PLAN = 6.0  # of a partner that is still counted on [s]
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What the policy keeps from step to step."""
+
+    sightlines: Sightlines
+    sequence: Floats
+    known: tuple[RiskRegion, ...] = ()
+    regions: Regions = field(default_factory=lambda: region_arrays(()))
+    rates: Floats = field(default_factory=lambda: np.zeros(0))
+    planned: float = -math.inf
+    looks: list[tuple[float, ...]] = field(default_factory=list)
+
+
+@pursuit_policy("lookahead")
+def lookahead(pursuit: Pursuit) -> FlyBanks:
+    """Fly the sequence of banks that is expected to see the most of the target.
+
+    Raises
+    ------
+    NoFeasibleFlightError
+        Every sequence meets a building of the chart or a no-fly region.
+    """
+    config, airframe, camera = pursuit.config.lookahead, pursuit.airframe, pursuit.camera
+    memory = _memory(pursuit)
+    banks = airframe.max_bank * np.linspace(-1.0, 1.0, config.banks)
+    steps = config.horizon * _SAMPLES
+    eye = Eye(camera.mounting, camera.half_aperture, camera.range)
+    cloud = _thinned(pursuit, memory)
+    places = forecast(pursuit.chart.walls, cloud, steps, _STEP)
+    weights = np.full(places.shape[:2], 1.0 / config.particles)
+    _share(pursuit, eye, places, weights)
+    search = Search(
+        banks,
+        config.horizon,
+        _SAMPLES,
+        _STEP,
+        airframe.roll_gain,
+        math.radians(airframe.max_roll_rate_deg),
+        config.width,
+        config.discount,
+        config.effort,
+        config.polish,
+    )
+    sequence, _ = plan(
+        pursuit.chart.walls,
+        memory.sightlines,
+        eye,
+        search,
+        memory.regions,
+        memory.rates,
+        np.array(pursuit.pose),
+        places,
+        weights,
+        _left_over(memory, pursuit.time),
+    )
+    if not sequence.size:
+        raise NoFeasibleFlightError(f"no flight of {config.horizon} s is free from {pursuit.pose}")
+    memory.sequence, memory.planned = sequence, pursuit.time
+    held = tuple(sequence[:MAX_BANKS].tolist())
+    return FlyBanks(held, _HOLD, airframe.speed, airframe.altitude)
+
+
+def _memory(pursuit: Pursuit) -> _Memory:
+    """The policy's own, with the regions that the agent knows of by now."""
+    altitude = pursuit.airframe.altitude
+    memory = pursuit.memory.get("lookahead")
+    if not isinstance(memory, _Memory):
+        lines = new_sightlines(altitude, pursuit.camera.target_height)
+        sequence = np.zeros(pursuit.config.lookahead.horizon)
+        memory = pursuit.memory["lookahead"] = _Memory(lines, sequence)
+    if memory.known != pursuit.dangers.regions:
+        memory.known, price = pursuit.dangers.regions, pursuit.config.lookahead.exposure
+        memory.regions = region_arrays(memory.known)
+        rates = [math.inf if one.rate is None else price * one.rate for one in memory.known]
+        memory.rates = np.array(rates, dtype=np.float64)
+    return memory
+
+
+def _left_over(memory: _Memory, time: float) -> Floats:
+    """What is left of the last plan, level at its end; level flight where there is none."""
+    size, gone = memory.sequence.size, time - memory.planned
+    rest = memory.sequence[min(round(min(gone, size) / _HOLD), size) :]
+    return np.concatenate((rest, np.zeros(size - rest.size)))
+
+
+def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
+    """Particles of equal weight that stand for the belief, corrected by what was not seen."""
+    camera, track = pursuit.camera, pursuit.track
+    memory.looks = [look for look in memory.looks if look[0] > track.last_seen]
+    if track.last_seen < pursuit.time:
+        memory.looks.append((pursuit.time, *pursuit.pose[:5]))
+        memory.looks.extend(
+            (partner.time, *partner.pose[:5])
+            for partner in pursuit.partners
+            if partner.time > track.last_seen
+        )
+        memory.looks = sorted(set(memory.looks))[-_MOST_LOOKS:]
+    particles, weights = pursuit.cloud()
+    particles, weights = np.ascontiguousarray(particles), weights.copy()
+    discredit(
+        pursuit.chart.walls,
+        particles,
+        weights,
+        pursuit.time,
+        np.array(memory.looks).reshape(-1, 6),
+        camera.mounting,
+        camera.target_height,
+        camera.half_aperture,
+        camera.range,
+        _MISS,
+    )
+    count = pursuit.config.lookahead.particles
+    sums = np.cumsum(weights)
+    picks = np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
+    return np.ascontiguousarray(particles[np.minimum(picks, len(particles) - 1)])
+
+
+def _share(pursuit: Pursuit, eye: Eye, places: Floats, weights: Floats) -> None:
+    """Take from the weights what the partners will see, as far as their plans are known."""
+    airframe, trust = pursuit.airframe, pursuit.config.lookahead.trust
+    for partner in pursuit.partners:
+        age = pursuit.time - partner.time
+        if partner.plan is None or age > _OLDEST_PLAN:
+            continue
+        poses = roll_out(
+            np.array(partner.pose),
+            np.array(partner.plan.banks),
+            partner.plan.hold,
+            age,
+            len(places) - 1,
+            _STEP,
+            airframe.roll_gain,
+            math.radians(airframe.max_roll_rate_deg),
+        )
+        height = pursuit.camera.target_height
+        shade(pursuit.chart.walls, eye, poses, places, weights, height, trust)

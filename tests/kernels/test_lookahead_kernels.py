@@ -1,0 +1,261 @@
+"""The look-ahead's kernels against the flight dynamics, slow oracles and brute force."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from staniel.city import City
+from staniel.kernels.flight import BANKS, COMMAND_WIDTH, fly
+from staniel.kernels.footprint import BODY
+from staniel.kernels.forecast import discredit, forecast
+from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookout import Eye, no_regions, roll_out, shade, watch
+from staniel.kernels.risk import Regions
+from staniel.kernels.sightlines import AIR, GROUND, SLOTS, new_sightlines, sees, slot_of
+from staniel.kernels.walls import inside_points, line_of_sight
+
+ROLL_GAIN, ROLL_RATE, SPEED = 3.0, math.radians(60.0), 15.0
+LIMIT = math.radians(35.0)
+EYE = Eye(BODY, math.radians(60.0), 250.0)
+OPEN = City.open((600.0, 600.0))
+
+
+def flown(start, banks, dt=0.1):
+    """Poses every 0.5 s of the autopilot's own flight, one second a bank."""
+    limits = np.array([[11.0, 20.0, 1.5, 3.0, 0.7, ROLL_RATE, ROLL_GAIN, 1.2, 1.0, 1.0, 0.25]])
+    command = np.zeros((1, COMMAND_WIDTH))
+    command[0, :3] = BANKS, SPEED, start[2]
+    command[0, 3:5] = 1.0, len(banks)
+    command[0, 5 : 5 + len(banks)] = banks
+    steps = round(len(banks) / dt)
+    path, _ = fly(
+        start[None].copy(), np.zeros(1), command, limits, np.zeros((steps, 1, 2)), dt, steps
+    )
+    return np.concatenate((start[None], path[round(0.5 / dt) - 1 :: round(0.5 / dt), 0]))
+
+
+def axis_of(heading, bank):
+    """Camera axis by rotation matrices, thesis eq. 4.2 (corrected)."""
+    c, s = math.cos(heading), math.sin(heading)
+    yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    c, s = math.cos(-bank), math.sin(-bank)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    return yaw @ roll @ np.array([0.0, 0.0, -1.0])
+
+
+def hidden(city, eye, point):
+    """Whether a building stands between, by its outline and the height of the line over it."""
+    line = shapely.LineString([eye[:2], point[:2]])
+    for outline, roof in zip(city.outlines, city.heights, strict=True):
+        part = line.intersection(outline)
+        if part.is_empty or part.length < 1e-9:
+            continue
+        shares = [
+            line.project(shapely.Point(p)) / line.length for p in shapely.get_coordinates(part)
+        ]
+        if min(eye[2] + t * (point[2] - eye[2]) for t in shares) < roof:
+            return True
+    return False
+
+
+def in_view(pose, point, half_aperture=EYE.half_aperture, reach=EYE.reach):
+    way = np.asarray(point) - pose[:3]
+    distance = np.linalg.norm(way)
+    cosine = way @ axis_of(pose[3], pose[4]) / distance
+    return distance <= reach and math.acos(min(1.0, cosine)) <= half_aperture
+
+
+def search(**changes):
+    banks = np.array([-LIMIT, 0.0, LIMIT])
+    usual = Search(banks, 3, 2, 0.5, ROLL_GAIN, ROLL_RATE, 200, 0.9, 0.0, 0)
+    return usual._replace(**changes)
+
+
+def slots_of(memory, places):
+    return np.array([slot_of(memory, x, y) for x, y in places])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_roll_out_is_what_the_autopilot_flies(seed):
+    rng = np.random.default_rng(seed)
+    banks = rng.uniform(-LIMIT, LIMIT, 12)
+    start = np.array([10.0, 20.0, 80.0, rng.uniform(-3, 3), rng.uniform(-0.5, 0.5), SPEED])
+    ours = roll_out(start, banks, 1.0, 0.0, 24, 0.5, ROLL_GAIN, ROLL_RATE)
+    theirs = flown(start, banks)
+    np.testing.assert_allclose(ours[:, :2], theirs[:, :2], atol=0.3)
+    turned = np.angle(np.exp(1j * (ours[:, 3] - theirs[:, 3])))
+    np.testing.assert_allclose(turned, 0.0, atol=0.005)
+    np.testing.assert_allclose(ours[:, 4], theirs[:, 4], atol=1e-9)
+
+
+def test_a_roll_out_of_an_old_plan_goes_on_from_where_its_flyer_is_now():
+    start, banks = np.array([0.0, 0.0, 80.0, 0.0, 0.0, SPEED]), np.array([0.5, -0.5, 0.2])
+    whole = roll_out(start, banks, 1.0, 0.0, 10, 0.5, ROLL_GAIN, ROLL_RATE)
+    later = roll_out(start, banks, 1.0, 2.0, 6, 0.5, ROLL_GAIN, ROLL_RATE)
+    np.testing.assert_allclose(later, whole[4:])
+
+
+def test_what_a_pose_sees_is_what_rotation_matrices_and_shapely_say():
+    city = City.generate(size=(200.0, 200.0), density=0.5, block=(40.0, 60.0), seed=3)
+    memory, rng = new_sightlines(60.0, 1.0), np.random.default_rng(1)
+    both = set()
+    for _ in range(300):
+        place = rng.uniform(20.0, 180.0, 2)
+        memory.owners[:] = -1
+        # From the middle of an air cell the memory is exact.
+        x, y = place + (rng.integers(-12, 12, 2) + 0.5) * AIR
+        heading, bank = rng.uniform(-math.pi, math.pi), rng.uniform(-LIMIT, LIMIT)
+        point = (*place, 1.0)
+        pose = np.array([x, y, 60.0, heading, bank])
+        buried = any(shapely.contains_xy(o, *place) for o in city.outlines)
+        expected = in_view(pose, point) and not buried and not hidden(city, pose[:3], point)
+        seen = watch(
+            memory, city.walls, EYE, slots_of(memory, [place]), place[None], np.array([0.7]),
+            x, y, heading, bank,
+        )  # fmt: skip
+        assert seen == pytest.approx(0.7 * expected)
+        both.add(expected)
+    assert both == {True, False}
+
+
+def test_cells_that_share_a_slot_evict_each_other_and_never_answer_for_each_other():
+    wall = City.from_outlines([shapely.box(95.0, 0.0, 105.0, 600.0)], [300.0], (600.0, 600.0))
+    memory = new_sightlines(50.0, 1.0)
+    near, far = (90.0, 50.0), (90.0 + SLOTS * GROUND, 50.0)
+    slots = set()
+    for place, free in ((near, False), (far, True), (near, False)):
+        slot = slot_of(memory, *place)
+        slots.add(slot)
+        assert sees(memory, wall.walls, slot, place[0] + 20.0, 50.0) == free
+    assert len(slots) == 1
+
+
+def test_sight_from_beyond_the_remembered_air_is_looked_up_exactly():
+    city, memory = City.generate(seed=2), new_sightlines(45.0, 1.0)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        place = rng.uniform(0.0, 600.0, 2)
+        slot = slot_of(memory, *place)
+        x, y = memory.places[slot] + 160.0 * rng.choice([-1.0, 1.0], 2)
+        exact = line_of_sight(city.walls, *memory.places[slot], 1.0, x, y, 45.0)
+        assert sees(memory, city.walls, slot, x, y) == exact
+
+
+def test_a_forecast_goes_straight_in_the_open_and_never_enters_a_building():
+    cloud = np.array([[100.0, 100.0, 2.0, 0.0], [300.0, 300.0, -1.0, 1.0], [50.0, 50.0, 0.0, 0.0]])
+    places = forecast(OPEN.walls, cloud, 10, 0.5)
+    times = 0.5 * np.arange(11)[:, None, None]
+    np.testing.assert_allclose(places, cloud[None, :, :2] + times * cloud[None, :, 2:], atol=1e-9)
+
+    city, rng = City.generate(density=0.6, block=(45.0, 95.0), seed=5), np.random.default_rng(0)
+    spots = rng.uniform(10.0, 590.0, (2000, 2))
+    spots = spots[~inside_points(city.walls, spots)][:300]
+    angles = rng.uniform(-math.pi, math.pi, len(spots))
+    velocities = 2.0 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    cloud = np.concatenate((spots, velocities), axis=1)
+    places = forecast(city.walls, cloud, 24, 0.5)
+    assert not inside_points(city.walls, np.ascontiguousarray(places.reshape(-1, 2))).any()
+    # They keep moving: a straight line would have taken many of them into walls.
+    moved = np.linalg.norm(places[-1] - places[0], axis=1)
+    straight = inside_points(city.walls, np.ascontiguousarray(spots + 12.0 * velocities))
+    assert straight.mean() > 0.3
+    assert np.median(moved[straight]) > 5.0
+
+
+def test_looks_in_vain_take_weight_from_what_they_would_have_shown():
+    rng, n = np.random.default_rng(4), 200
+    cloud = np.concatenate((rng.uniform(0.0, 300.0, (n, 2)), rng.normal(0.0, 1.0, (n, 2))), axis=1)
+    weights = np.full(n, 1.0 / n)
+    looks = np.array([[7.0, 100.0, 100.0, 60.0, 0.3, 0.4], [9.0, 180.0, 90.0, 60.0, 1.0, -0.2]])
+    expected = weights.copy()
+    for look in looks:
+        for i in range(n):
+            place = cloud[i, :2] - (10.0 - look[0]) * cloud[i, 2:]
+            expected[i] *= 0.1 if in_view(look[1:], (*place, 1.0)) else 1.0
+    discredit(OPEN.walls, cloud, weights, 10.0, looks, BODY, 1.0, *EYE[1:], 0.1)
+    np.testing.assert_allclose(weights, expected / expected.sum(), rtol=1e-9)
+    assert len(np.unique(np.round(weights / weights.max(), 6))) == 3
+
+
+def test_a_search_finds_what_trying_every_sequence_finds():
+    rng = np.random.default_rng(7)
+    for _ in range(6):
+        start = np.array([300.0, 300.0, 50.0, rng.uniform(-3, 3), rng.uniform(-0.5, 0.5), SPEED])
+        places = np.tile(rng.uniform(200.0, 400.0, (1, 5, 2)), (7, 1, 1))
+        weights = np.tile(rng.uniform(0.1, 0.3, (1, 5)), (7, 1))
+
+        def worth(banks, start=start, places=places, weights=weights):
+            total = 0.0
+            for t, pose in enumerate(flown(start, banks)[1:], start=1):
+                seen = [in_view(pose, (*p, 1.0)) for p in places[t]]
+                total += 0.9 ** (0.5 * t) * 0.5 * (weights[t] @ seen)
+            away = math.dist(pose[:2], places[0].mean(axis=0))
+            return total - 0.9**3.0 * 0.02 * max(0.0, away - 30.0)
+
+        best = max(worth(banks) for banks in itertools.product(search().banks, repeat=3))
+        banks, value = plan(
+            OPEN.walls, new_sightlines(50.0, 1.0), EYE, search(), *no_regions(), start, places,
+            weights, np.zeros(3),
+        )  # fmt: skip
+        assert value == pytest.approx(worth(banks), abs=0.05)
+        assert value >= best - 0.05
+        polished = plan(
+            OPEN.walls, new_sightlines(50.0, 1.0), EYE, search(polish=3), *no_regions(), start,
+            places, weights, np.zeros(3),
+        )[1]  # fmt: skip
+        assert polished >= value
+
+
+def crossing(regions, rates, city=OPEN, start=(100.0, 300.0, 30.0, 0.0, 0.0, SPEED), holds=8):
+    """The way of a plan towards a target so far east that straight ahead is best."""
+    places = np.full((2 * holds + 1, 1, 2), (450.0, 300.0))
+    weights = np.ones(places.shape[:2])
+    begin = np.array(start)
+    banks, _ = plan(
+        city.walls, new_sightlines(start[2], 1.0), EYE, search(holds=holds), regions, rates,
+        begin, places, weights, np.zeros(holds),
+    )  # fmt: skip
+    if not banks.size:
+        return None
+    return shapely.LineString(
+        roll_out(begin, banks, 1.0, 0.0, 2 * holds, 0.5, 3.0, ROLL_RATE)[:, :2]
+    )
+
+
+def test_no_fly_regions_and_buildings_are_flown_around_and_threats_where_it_pays():
+    disc = shapely.Point(175.0, 300.0).buffer(25.0)
+    assert crossing(*no_regions()).intersects(disc)
+    box = np.array([[150.0, 200.0, 275.0, 325.0, 0.0, np.inf]])
+    region = Regions(box, np.array([[175.0, 300.0, 25.0]]), np.array([0, 0]), np.zeros((0, 2)))
+    for rate in (np.inf, 10.0):
+        way = crossing(region, np.array([rate]))
+        # Looked at every half a second, 7.5 m: a corner of the disc may be cut.
+        assert way.intersection(disc.buffer(-2.0)).length == 0.0
+    assert crossing(region, np.array([1e-6])).intersects(disc)
+    tower = shapely.box(160.0, 285.0, 190.0, 315.0)
+    city = City.from_outlines([tower], [100.0], (600.0, 600.0))
+    assert not crossing(*no_regions(), city=city).intersects(tower.buffer(3.0))
+
+
+def test_no_plan_where_every_flight_ends_in_a_building():
+    ring = shapely.box(50.0, 250.0, 150.0, 350.0) - shapely.box(90.0, 290.0, 110.0, 310.0)
+    city = City.from_outlines([ring], [100.0], (600.0, 600.0))
+    assert crossing(*no_regions(), city=city) is None
+
+
+def test_what_a_partner_sees_counts_for_little():
+    poses = roll_out(
+        np.array([0.0, 0.0, 50.0, 0.0, 0.0, SPEED]), np.zeros(1), 1.0, 0.0, 12, 0.5, 3.0, 1.0
+    )
+    places = np.tile(np.array([[[90.0, 0.0], [90.0, 200.0]]]), (13, 1, 1))
+    weights = np.full((13, 2), 0.5)
+    shade(OPEN.walls, EYE, poses, places, weights, 1.0, 0.9)
+    for t, pose in enumerate(poses):
+        for j in range(2):
+            seen = in_view(pose, (*places[t, j], 1.0))
+            assert weights[t, j] == pytest.approx(0.05 if seen else 0.5)
+    assert 0.05 < weights[:, 0].mean() < 0.5
+    assert (weights[:, 1] == 0.5).all()
