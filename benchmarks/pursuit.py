@@ -148,6 +148,8 @@ def paths_of(mission: Mission, step: float = 0.1) -> tuple[NDArray[Any], NDArray
             aircraft.append(frame.truth.aircraft_path)
             vehicles.append(frame.truth.vehicle_path)
         held = held or any(belief.target is not None for belief in frame.beliefs)
+    if not aircraft:
+        return np.zeros((0, 1, 6)), np.zeros((0, 1, 4))
     every = round(FINE / step)
     return (
         np.ascontiguousarray(np.concatenate(aircraft)[every - 1 :: every]),
@@ -162,6 +164,8 @@ def judged(city: City, camera: Any, aircraft: NDArray[Any], vehicles: NDArray[An
         camera.mounting, np.full((*aircraft.shape[:2], 2), np.nan),
     )  # fmt: skip
     seen = counts[:, 0] > 0
+    if not seen.size:
+        return Flown(math.nan, math.nan, math.nan, 0)  # Never found, whatever the policy.
     strikes = 0
     if aircraft[..., 2].min() < city.tallest:
         for x, y, z in aircraft[..., :3].reshape(-1, 3):
@@ -220,7 +224,8 @@ def tuned(case: Case, kind: list[dict[str, Any]], seeds: int, minutes: float, po
     best, least = kind[0], math.inf
     for guidance in kind:
         job = partial(fly, case._replace(loss=0.0), guidance, minutes)
-        hidden = mean(pool.map(job, range(TUNING, TUNING + seeds)))
+        flights = pool.map(job, range(TUNING, TUNING + seeds))
+        hidden = mean(flight for flight in flights if not math.isnan(flight.hidden))
         if hidden < least:
             best, least = guidance, hidden
     return best
@@ -251,6 +256,9 @@ def study(case: Case, options: argparse.Namespace, pool: Any) -> dict[str, Any]:
     }
     if options.bound and case.aircraft == 1:
         flights["known future"] = pool.map(partial(fly_knowing, case, minutes), seeds)
+    found = [not math.isnan(flight.hidden) for flight in flights["carrot"]]
+    flights = {name: list(itertools.compress(flown, found)) for name, flown in flights.items()}
+    print(f"  {sum(found)} of {len(found)} missions, in the others nobody ever found the target")
     for name, flown in flights.items():
         print(row(name, flown), {k: v for k, v in chosen.get(name, {}).items() if k != "pursuit"})
     classic = min(("carrot", "orbit"), key=lambda name: mean(flights[name]))
