@@ -27,7 +27,8 @@ def best_radius(airframe: Airframe) -> float:
     On an orbit of radius r at height z the center is :math:`\arctan(r/z)` off the vertical, and the
     bank of the turn, :math:`\arctan(V^2/(g r))`, adds to that, for the camera swings outwards. With
     :math:`a = V^2/g` the sum is least at :math:`r = \sqrt{a z}`, and there
-    :math:`2\arctan\sqrt{a/z}`; where z < a it only grows with r.
+    :math:`2\arctan\sqrt{a/z}`. Where z < a it is above a right angle on every orbit, and the
+    tightest is as good as any.
 
     Examples
     --------

@@ -163,6 +163,8 @@ def _polished(scene: Scene, sequence: Floats) -> float:
     _begin(scene.start, rows)
     limit, size = search.banks[-1], search.banks[1] - search.banks[0]
     best = _flown(scene, sequence, rows, 0)
+    if best == -math.inf:
+        return best  # The rows after its end were never filled in.
     trial = rows.copy()
     for _ in range(search.polish):
         size *= 0.5
