@@ -13,6 +13,8 @@ from staniel.guidance.following import (
     orbit_course,
 )
 from staniel.guidance.loiter import loiter
+from staniel.guidance.path_manager import PathState, follow
+from staniel.guidance.paths import Path, dubins_path, waypoint_path
 from staniel.guidance.pursuit import (
     Policy,
     Pursuit,
@@ -28,11 +30,15 @@ __all__ = [
     "Follower",
     "GuidanceConfig",
     "KnownDangers",
+    "Path",
+    "PathState",
     "Policy",
     "Pursuit",
     "carrot",
     "carrot_line",
     "carrot_loiter",
+    "dubins_path",
+    "follow",
     "follower_named",
     "follower_names",
     "heading_for_course",
@@ -42,4 +48,5 @@ __all__ = [
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",
+    "waypoint_path",
 ]
