@@ -17,6 +17,8 @@ from staniel.guidance.following import (
 from staniel.guidance.loiter import loiter, safe_loiter
 from staniel.guidance.lookahead import lookahead
 from staniel.guidance.orbit import best_radius, orbit
+from staniel.guidance.path_manager import PathState, follow
+from staniel.guidance.paths import Path, dubins_path, waypoint_path
 from staniel.guidance.pursuit import (
     NoFeasibleFlightError,
     Partner,
@@ -37,6 +39,8 @@ __all__ = [
     "LookaheadConfig",
     "NoFeasibleFlightError",
     "Partner",
+    "Path",
+    "PathState",
     "Paths",
     "Policy",
     "Pursuit",
@@ -46,6 +50,8 @@ __all__ = [
     "carrot",
     "carrot_line",
     "carrot_loiter",
+    "dubins_path",
+    "follow",
     "follower_named",
     "follower_names",
     "heading_for_course",
@@ -60,4 +66,5 @@ __all__ = [
     "safe_loiter",
     "shortest",
     "shortest_in_wind",
+    "waypoint_path",
 ]
