@@ -15,10 +15,17 @@ from staniel.cooperation import Allocation, CooperationConfig, SearchMap, Task
 from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyLine
-from staniel.datatypes.equipment import Airframe, Camera
+from staniel.datatypes.equipment import Airframe, Camera, Lidar
 from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
-from staniel.guidance import GuidanceConfig, KnownDangers, Pursuit, loiter, pursuit_policy_named
+from staniel.guidance import (
+    GuidanceConfig,
+    KnownDangers,
+    Pursuit,
+    avoidance_for,
+    loiter,
+    pursuit_policy_named,
+)
 from staniel.kernels.dubins import lengths
 from staniel.tracking import Tracker, TrackingConfig
 
@@ -42,6 +49,7 @@ class Briefing:
     guidance: GuidanceConfig
     risk: tuple[RiskRegion, ...] = ()
     carried: CarriedThreat | None = None
+    lidar: Lidar = Lidar()
 
 
 class Agent:
@@ -81,6 +89,9 @@ class Agent:
         self.dangers = KnownDangers(
             briefing.risk, briefing.carried, speed=briefing.tracking.max_speed
         )
+        self._avoidance = avoidance_for(
+            id, airframe, clock, briefing.chart, briefing.lidar, briefing.guidance
+        )
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
         self.belief = Belief((), "search", None, (0.0, 0.0))
@@ -108,6 +119,7 @@ class Agent:
         tracks = self._track(percept, inbox)
         outbox = self._allocate(percept, tracks, inbox)
         command, role, goal = self._fly(time, pose, inbox, outbox)
+        command, guard = self._avoid(percept, inbox, command)
         if percept.sightings:
             outbox.append(
                 Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
@@ -116,8 +128,18 @@ class Agent:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
         outbox.append(self._allocation.heartbeat(role, goal))
         held = self._allocation.holding
-        self.belief = Belief(self._tracker.estimates, role, None if held is None else held.id, goal)
+        target = None if held is None else held.id
+        self.belief = Belief(self._tracker.estimates, role, target, goal, guard)
         return command, outbox
+
+    def _avoid(
+        self, percept: Percept, inbox: Sequence[Message], command: Command
+    ) -> tuple[Command, str]:
+        """What was decided, or what is safe in its place."""
+        if self._avoidance is None:
+            return command, ""
+        heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
+        return self._avoidance.step(percept, heartbeats, self.dangers.regions, command)
 
     def _track(self, percept: Percept, inbox: Sequence[Message]) -> list[TrackEstimate]:
         """Own sightings and those of the others, fused in one tracker."""

@@ -17,7 +17,7 @@ from staniel.errors import ScenarioError
 from staniel.kernels.flight import fly
 from staniel.kernels.gusts import blow
 from staniel.world import Traffic, Wind, World
-from staniel.world.aircraft import encode, limits
+from staniel.datatypes.autopilot import encode, limits
 from staniel.world.wind import dryden, mean_wind
 
 LIMITS = limits([Airframe()])

@@ -1,5 +1,6 @@
-"""How to fly it: loiters and pursuit policies, and the dangers known on the way."""
+"""How to fly it: loiters, pursuit policies, avoidance, and the dangers known on the way."""
 
+from staniel.guidance.avoidance import Avoidance, avoidance_for
 from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers, KnownDangers
 from staniel.guidance.loiter import loiter
@@ -14,11 +15,13 @@ from staniel.guidance.pursuit import (
 
 __all__ = [
     "NO_DANGERS",
+    "Avoidance",
     "Dangers",
     "GuidanceConfig",
     "KnownDangers",
     "Policy",
     "Pursuit",
+    "avoidance_for",
     "carrot",
     "loiter",
     "pursuit_names",

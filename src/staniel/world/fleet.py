@@ -22,7 +22,7 @@ from staniel.datatypes.truth import (
     nominal,
 )
 from staniel.kernels.flight import fly
-from staniel.world.aircraft import encode, limits
+from staniel.datatypes.autopilot import encode, limits
 from staniel.world.config import Faults, Launch, Wind
 from staniel.world.faults import Failures
 from staniel.world.launch import Pad, on_perimeter
