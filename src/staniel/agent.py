@@ -6,7 +6,7 @@ What flies knows only what it saw, what it was told, and what it was ordered.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -126,7 +126,8 @@ class Agent:
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
-        outbox.append(self._allocation.heartbeat(role, goal))
+        heartbeat = self._allocation.heartbeat(role, goal)
+        outbox.append(heartbeat if self._avoidance is None else replace(heartbeat, command=command))
         held = self._allocation.holding
         target = None if held is None else held.id
         self.belief = Belief(self._tracker.estimates, role, target, goal, guard)

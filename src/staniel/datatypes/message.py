@@ -7,6 +7,7 @@ first two a receiver recognises a copy. The auction's words are those of thesis 
 from dataclasses import dataclass
 
 from staniel.datatypes.belief import Pose, Sighting, TrackId
+from staniel.datatypes.command import Command
 from staniel.datatypes.threats import Threats
 
 __all__ = [
@@ -42,7 +43,10 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
-    """I am alive, here, doing this. A held target's award is a lease that this renews."""
+    """I am alive, here, doing this. A held target's award is a lease that this renews.
+
+    Who avoids others says what it flies now, too.
+    """
 
     pose: Pose
     role: str
@@ -50,6 +54,7 @@ class Heartbeat(Message):
     target: TrackId | None
     target_position: Point | None
     cost: float
+    command: Command | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ head           16: kind 1, length 1, sender 2, sequence 4, time 8; every message
 track name     14: born 8, founder 2, serial 4
 point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
-heartbeat      head, pose, role 1, goal, track name, point, cost
+heartbeat      head, pose, role 1, goal, track name, point, cost; and 29 for a command: kind 1, seven
+               4-byte numbers
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
 warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
                each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,
@@ -48,7 +49,7 @@ SIGHTING: Final = 54
 CARRIER: Final = 38
 """What each carrier adds to a warning [byte]."""
 
-_NAME, _POINT, _COST, _POSE, _REGION, _DISC = 14, 8, 4, 24, 15, 12
+_NAME, _POINT, _COST, _POSE, _REGION, _DISC, _COMMAND = 14, 8, 4, 24, 15, 12, 29
 
 _SIZES: Final[dict[type[Message], int]] = {
     Heartbeat: HEAD + _POSE + 1 + _POINT + _NAME + _POINT + _COST,
@@ -71,7 +72,9 @@ def wire_size(message: Message) -> int:
     16
     """
     size = _SIZES.get(type(message), HEAD)
-    if isinstance(message, Report):
+    if isinstance(message, Heartbeat):
+        size += 0 if message.command is None else _COMMAND
+    elif isinstance(message, Report):
         size += SIGHTING * len(message.sightings)
     elif isinstance(message, Warn):
         size += CARRIER * len(message.threats.carriers)

@@ -7,10 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.belief import Pose
+from staniel.datatypes.command import FlyBanks
 from staniel.datatypes.equipment import GRAVITY, Airframe
 from staniel.datatypes.message import Heartbeat
 from staniel.kernels.avoidance import Others
+from staniel.kernels.flight import fly
 
 __all__ = ["FORGET", "Neighbours"]
 
@@ -25,23 +28,26 @@ _TURNING = 0.35  # of the sharpest turn: what another may do that nobody expects
 _MOST = 18.0  # ... and how far that takes it before it, too, gives way [m]
 _ASTRAY = 2.5  # how much less is known of a place with each second of silence [m/s]
 _HEARD = 1.5  # a word that is not older is news [s]
-_CLIMBING = 4.0  # how long another is taken to go on climbing [s]
 _CLIMB = 0.5, 3.0  # what is not known of its height grows by [m/s], up to [m]
-_GIVES_WAY = 4.0  # how near in time one that has to give way is reckoned with [s]
+_GIVES_WAY = 5.0  # how near in time one that has to give way is reckoned with [s]
+_NOWHERE = 1e-9  # what is kept from one that is not reckoned with [m]
 
 
 class _Heard(NamedTuple):
+    """What one aircraft said, and where that leads: (t, 3) at multiples of `_STEP` from then."""
+
     time: float
     pose: Pose
-    climb: float
+    flown: Floats
+    straight: Floats
 
 
 class Neighbours:
     """The other aircraft, as one of them knows them.
 
-    Each is expected to keep its turn and its speed, and its climb for some seconds. What is kept
-    from that place is the separation and more: what an unexpected turn makes of it, growing
-    with the time since it was last heard, so that silence makes careful.
+    Each is expected to fly on what it said that it flies, or straight ahead: it may have been told
+    otherwise since. What is kept from both places is the separation and more: what an unexpected
+    turn makes of it, growing with the time since it was last heard, so that silence makes careful.
 
     Parameters
     ----------
@@ -56,10 +62,21 @@ class Neighbours:
     def __init__(self, own: int, airframe: Airframe, separation: float) -> None:
         self._own, self._separation = own, separation
         self._sideways = _TURNING * GRAVITY * math.tan(airframe.max_bank)
+        self._limits = limits([airframe])
         self._heard: dict[int, _Heard] = {}
 
-    def step(self, time: float, heartbeats: Iterable[Heartbeat]) -> None:
-        """Take note of what was heard, and forget who was not heard for too long."""
+    def step(
+        self, time: float, heartbeats: Iterable[Heartbeat], wind: tuple[float, float]
+    ) -> None:
+        """Take note of what was heard, and forget who was not heard for too long.
+
+        Parameters
+        ----------
+        time : float [s]
+        heartbeats : iterable of Heartbeat
+        wind : (float, float) [m/s]
+            The air that carries them all, to east and north.
+        """
         for word in sorted(heartbeats, key=lambda word: word.time):
             before = self._heard.get(word.sender)
             if word.sender == self._own or (before is not None and before.time >= word.time):
@@ -67,16 +84,34 @@ class Neighbours:
             climb = 0.0
             if before is not None:
                 climb = (word.pose.z - before.pose.z) / (word.time - before.time)
-            self._heard[word.sender] = _Heard(word.time, word.pose, climb)
+            flown, straight = self._expected(word, climb, wind)
+            self._heard[word.sender] = _Heard(word.time, word.pose, flown, straight)
         self._heard = {
             who: heard for who, heard in self._heard.items() if time - heard.time <= FORGET
         }
+
+    def _expected(
+        self, word: Heartbeat, climb: float, wind: tuple[float, float]
+    ) -> tuple[Floats, Floats]:
+        """Where what it flies leads, and where it comes straight ahead."""
+        steps = round((FORGET + _HORIZON) / _STEP)
+        start, rates = np.array([word.pose]), np.array([climb])
+        air = np.empty((steps, 1, 2))
+        air[:] = wind
+        level = FlyBanks((0.0,), 1.0, word.pose.speed, word.pose.z)
+        ways = []
+        for command in (word.command or level, level):
+            row = encode([command])
+            row[0, 2] = row[0, 2] if word.command is None else word.command.altitude
+            path, _ = fly(start, rates, row, self._limits, air, _STEP, steps)
+            ways.append(np.concatenate([start[:, :3], path[:, 0, :3]]))
+        return ways[0], ways[1]
 
     def poses(self) -> list[Pose]:
         """What was last heard of each, in the order of their numbers."""
         return [self._heard[who].pose for who in sorted(self._heard)]
 
-    def at(self, time: float, pose: Pose, reach: float, wind: tuple[float, float]) -> Others:
+    def at(self, time: float, pose: Pose, reach: float) -> Others:
         """Those that may come near, as the kernels read them.
 
         Parameters
@@ -85,24 +120,24 @@ class Neighbours:
         pose : Pose
             Of the aircraft itself.
         reach : float [m]
-            Who is expected farther away than this is left out.
-        wind : (float, float) [m/s]
-            The air that carries them all, to east and north.
+            Who was heard farther away than this is left out.
 
         Returns
         -------
         Others
         """
-        ahead = np.arange(0.0, _HORIZON + _STEP, _STEP)
+        ahead = np.arange(0.0, _HORIZON, _STEP)
         places, apart = [], []
         for who in sorted(self._heard):
             heard = self._heard[who]
             silent = time - heard.time
-            place = _expected(heard, silent + ahead, wind)
-            if math.hypot(place[0, 0] - pose.x, place[0, 1] - pose.y) > reach:
+            if math.hypot(heard.pose.x - pose.x, heard.pose.y - pose.y) > reach:
                 continue
-            places.append(place)
-            apart.append(self._apart(silent, ahead, who > self._own))
+            now = round(silent / _STEP)
+            keep = self._apart(silent, ahead, who > self._own)
+            for way in (heard.flown, heard.straight):
+                places.append(way[now : now + len(ahead)])
+                apart.append(keep)
         shape = (-1, len(ahead))
         return Others(
             np.array(places, dtype=np.float64).reshape(*shape, 3),
@@ -119,22 +154,5 @@ class Neighbours:
         rate, most = _CLIMB
         apart[:, 1] = self._separation + np.minimum(rate * since, most)
         if gives_way:
-            apart[ahead > _GIVES_WAY] = 1e-9
+            apart[ahead > _GIVES_WAY] = _NOWHERE
         return apart
-
-
-def _expected(heard: _Heard, since: Floats, wind: tuple[float, float]) -> Floats:
-    """(t, 3) places so long after the last word [m]."""
-    pose = heard.pose
-    rate = GRAVITY / pose.speed * math.tan(pose.bank)
-    if abs(rate) < 1e-3:
-        along, aside = pose.speed * since, np.zeros_like(since)
-    else:
-        along = pose.speed / rate * np.sin(rate * since)
-        aside = pose.speed / rate * (1.0 - np.cos(rate * since))
-    cos, sin = math.cos(pose.heading), math.sin(pose.heading)
-    places = np.empty((len(since), 3))
-    places[:, 0] = pose.x + along * cos - aside * sin + wind[0] * since
-    places[:, 1] = pose.y + along * sin + aside * cos + wind[1] * since
-    places[:, 2] = pose.z + heard.climb * np.minimum(since, _CLIMBING)
-    return places

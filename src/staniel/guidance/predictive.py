@@ -89,20 +89,23 @@ class Predictive:
         """As `staniel.guidance.avoidance.Avoidance.step`."""
         pose, drift, airframe = percept.pose, self._drift, self._airframe
         drift.step(pose)
-        self._neighbours.step(percept.time, heartbeats)
+        self._neighbours.step(percept.time, heartbeats, drift.wind)
         tops = self._around.step(pose, percept.lidar)
-        others = self._neighbours.at(percept.time, pose, NEIGHBOURHOOD, drift.wind)
+        others = self._neighbours.at(percept.time, pose, NEIGHBOURHOOD)
         if tuple(regions) != self._regions:
             self._regions = tuple(regions)
             self._bans = bans(regions, self._config)
         level, goal = pose.z + drift.climb, look_point(command)
         wanted = encode([command])[0]
-        rows, longer = alternatives(pose, level, wanted, airframe, self._heading, self._escape)
-        choice = self._choose(pose, rows, longer, goal, tops, others)
+        rows, longer = wanted[None], np.zeros(1)
+        choice, clear = self._choose(pose, rows, longer, goal, tops, others)
+        if not clear or choice.harm.any():
+            rows, longer = alternatives(pose, level, wanted, airframe, self._heading, self._escape)
+            choice, _ = self._choose(pose, rows, longer, goal, tops, others)
         guard = "avoid" if choice.index else ""
         if choice.harm.any():
             resorts = last_resorts(pose, level, airframe, self._escape)
-            other = self._choose(pose, resorts, np.ones(len(resorts)), goal, tops, others)
+            other, _ = self._choose(pose, resorts, np.ones(len(resorts)), goal, tops, others)
             if _harm(other) < _harm(choice):
                 choice, rows = other, resorts
             guard = "loiter" if choice.harm.any() else "avoid"
@@ -121,8 +124,8 @@ class Predictive:
         goal: tuple[float, float],
         tops: Tops,
         others: Others,
-    ) -> Choice:
-        """The verified row that leads nearest to the goal; the first if that is clear."""
+    ) -> tuple[Choice, bool]:
+        """The verified row that leads nearest to the goal, and whether the first one is clear."""
         state, climb, speed = np.array(pose), self._drift.climb, self._airframe.speed
         wind = np.array(self._drift.wind)
         common = (self._limits, wind, tops, others, self._bans, self._rules)
@@ -130,15 +133,13 @@ class Predictive:
         east, north = goal if math.isfinite(goal[0]) else ends[0]
         cost = np.hypot(ends[:, 0] - east, ends[:, 1] - north) + longer
         cost += _SHORT * speed * (FORESIGHT - clear) + _BANNED * banned
-        if clear[0] >= FORESIGHT and longer[0] == 0.0:
-            cost[0] = -1.0
         order = np.argsort(cost, kind="stable")
-        return choose(state, climb, rows, order, speed, *common)
+        return choose(state, climb, rows, order, speed, *common), bool(clear[0] >= FORESIGHT)
 
 
-def _harm(choice: Choice) -> tuple[float, float]:
+def _harm(choice: Choice) -> float:
     walls, near, banned = choice.harm.tolist()
-    return walls + near, banned
+    return 1e4 * walls + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * banned
 
 
 def bans(regions: Sequence[RiskRegion], config: GuidanceConfig) -> Bans:

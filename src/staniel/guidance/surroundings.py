@@ -14,8 +14,8 @@ __all__ = ["Surroundings"]
 CELL = 3.0
 """Side of a cell [m]: neighbouring beams a degree apart leave no gap within 170 m."""
 
-REACH = 192.0
-"""Half the side of the window [m]: the way of eight seconds, and a circle at its end."""
+REACH = 150.0
+"""Half the side of the window [m]: the way of eight seconds, and room for a circle on the way."""
 
 ROOF_MARGIN = 2.0
 """Height kept above the roofs of the chart [m]."""

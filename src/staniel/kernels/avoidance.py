@@ -30,6 +30,10 @@ _WALL, _NEAR, _BAN = 0, 1, 2
 """What can be wrong with a way: seconds in closed air, how near others come, seconds banned."""
 
 
+_MARGINAL = 0.2
+"""What a second in the margin of a ban counts, of one in the ban."""
+
+
 class Others(NamedTuple):
     """Where other aircraft are expected, at multiples of `step` from now."""
 
@@ -109,12 +113,15 @@ def _too_near(others: Others, x: float, y: float, z: float, time: float) -> floa
 
 
 @njit(cache=True, error_model="numpy")
-def banned(bans: Bans, x: float, y: float, z: float) -> bool:
-    """Whether a place is within the margin of a no-fly region, or beyond the fence."""
+def _banned(bans: Bans, x: float, y: float, z: float) -> int:
+    """2 in a no-fly region or beyond the fence, 1 within the margin of one, else 0."""
+    worst = 0
     for k in range(bans.outside.shape[0]):
         if is_near(bans.regions, k, x, y, z, bans.margin, bans.outside[k]):
-            return True
-    return False
+            worst = max(worst, 1)
+            if is_near(bans.regions, k, x, y, z, 0.0, bans.outside[k]):
+                return 2
+    return worst
 
 
 @njit(cache=True, error_model="numpy")
@@ -132,9 +139,12 @@ def _fly_out(
     others: Others,
     apart_until: float,
     bans: Bans,
+    tolerated: int,
     harm: Floats,
 ) -> tuple[float, float]:
     """Fly a command, `state` in place, and add to `harm` what is wrong on the way.
+
+    Bans of a `tolerated` level do not count.
 
     Returns the climb rate and when the way first meets something, infinite where it does not. What
     comes early weighs more: there is less time to think again.
@@ -152,12 +162,24 @@ def _fly_out(
             near = _too_near(others, x, y, z, time) * math.exp(-0.1 * time)
             harm[_NEAR] = max(harm[_NEAR], near)
             wrong = wrong or near > 0.0
-        if banned(bans, x, y, z):
-            harm[_BAN] += dt
+        level = _banned(bans, x, y, z)
+        if level > tolerated:
+            harm[_BAN] += dt if level > 1 else _MARGINAL * dt
             wrong = True
         if wrong and first == np.inf:
             first = time
     return climb, first
+
+
+@njit(cache=True, error_model="numpy")
+def _total(harm: Floats) -> float:
+    """One number for what is wrong: walls and real nearness of others first, then bans.
+
+    Of the distance to keep from others more than half is for what nobody expects of them.
+    """
+    near = harm[_NEAR]
+    total: float = 1e4 * harm[_WALL] + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
+    return total
 
 
 @njit(cache=True, error_model="numpy")
@@ -245,7 +267,7 @@ def ways(
             count = rules.substeps if k == 0 else 1
             row = commands[c]
             rate, first = _fly_out(
-                own, rate, row, limits, wind, time, dt, count, tops, False, others, 1e9, bans, harm
+                own, rate, row, limits, wind, time, dt, count, tops, False, others, 1e9, bans, 0, harm
             )
             time += count * dt
             if first < np.inf and clear[c] >= rules.foresight:
@@ -285,10 +307,10 @@ def choose(
     Returns
     -------
     Choice
-        Walls and other aircraft come first, bans after them. Who is inside a ban already is not
-        asked that the escape be outside.
+        Walls and other aircraft come first, bans after them. Who is inside a ban already, or in its
+        margin, is not asked that the escape be outside of it.
     """
-    inside = banned(bans, state[0], state[1], state[2])
+    within = _banned(bans, state[0], state[1], state[2])
     best, least, least_harm = order[0], np.inf, np.zeros(3)
     best_escape, best_height, best_climb = np.zeros(COMMAND_WIDTH), state[2], climb
     for place in range(order.shape[0]):
@@ -296,10 +318,8 @@ def choose(
         there, first_harm = state.copy(), np.zeros(3)
         rate, _ = _fly_out(
             there, climb, commands[c], limits, wind, 0.0, rules.dt, rules.substeps,
-            tops, True, others, rules.apart_for, bans, first_harm,
+            tops, True, others, rules.apart_for, bans, within, first_harm,
         )  # fmt: skip
-        if inside:
-            first_harm[_BAN] = 0.0
         circles, seconds = _escapes(there, commands[c], limits, wind, speed)
         for e in range(circles.shape[0]):
             if seconds[e] == 0.0:
@@ -307,11 +327,9 @@ def choose(
             own, harm = there.copy(), first_harm.copy()
             _fly_out(
                 own, rate, circles[e], limits, wind, rules.dt * rules.substeps, rules.stride,
-                int(seconds[e] / rules.stride), tops, True, others, rules.apart_for, bans, harm,
+                int(seconds[e] / rules.stride), tops, True, others, rules.apart_for, bans, within, harm,
             )  # fmt: skip
-            if inside:
-                harm[_BAN] = 0.0
-            total = 1e4 * harm[_WALL] + 1e4 * harm[_NEAR] + harm[_BAN]
+            total = _total(harm)
             if total < least:
                 best, least, least_harm = c, total, harm
                 best_escape, best_height, best_climb = circles[e].copy(), there[2], rate
