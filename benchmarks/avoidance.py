@@ -19,11 +19,10 @@ from rich.console import Console
 from rich.table import Table
 from scipy import stats
 
-from staniel.agent import Agent
 from staniel.datatypes.truth import FLYING
 from staniel.kernels.warm import warm_all
 from staniel.scenario import Scenario, build_city, load_scenario
-from staniel.scenario.assemble import assemble, kernels_of
+from staniel.scenario.assemble import assemble
 from staniel.world import Hazards
 
 CONSOLE = Console(width=130)
@@ -95,7 +94,9 @@ def _regions(rng: np.random.Generator, size: float, starts: np.ndarray) -> list[
         if np.linalg.norm(starts - middle, axis=1).min() < STARTS + radius:
             continue
         x, y = middle.tolist()
-        corners = [(x + radius * a, y + radius * b) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        corners = [
+            (x + radius * a, y + radius * b) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ]
         shape = {"center": (x, y), "radius": radius} if k % 2 else {"polygon": corners}
         regions.append({"kind": "no-fly", "briefed": bool(rng.random() < 0.5), **shape})
     return regions
@@ -179,7 +180,9 @@ def main() -> None:
     parser.add_argument("--missions", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--minutes", type=float, default=2.0)
-    parser.add_argument("--policy", default="predictive", choices=["predictive", "saunders", "none"])
+    parser.add_argument(
+        "--policy", default="predictive", choices=["predictive", "saunders", "none"]
+    )
     parser.add_argument("--processes", type=int, default=multiprocessing.cpu_count())
     arguments = parser.parse_args()
     warm_all(lambda done, total: None, ["lidar", "risk", "threats", "occupancy", "avoidance"])

@@ -49,7 +49,7 @@ class Briefing:
     guidance: GuidanceConfig
     risk: tuple[RiskRegion, ...] = ()
     carried: CarriedThreat | None = None
-    lidar: Lidar = Lidar()
+    lidar: Lidar = Lidar()  # noqa: RUF009 - frozen
 
 
 class Agent:

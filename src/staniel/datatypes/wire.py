@@ -9,8 +9,8 @@ head           16: kind 1, length 1, sender 2, sequence 4, time 8; every message
 track name     14: born 8, founder 2, serial 4
 point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
-heartbeat      head, pose, role 1, goal, track name, point, cost; and 29 for a command: kind 1, seven
-               4-byte numbers
+heartbeat      head, pose, role 1, goal, track name, point, cost; and 29 for a command: kind 1,
+               seven 4-byte numbers
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
 warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
                each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,

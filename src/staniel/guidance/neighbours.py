@@ -20,7 +20,7 @@ __all__ = ["FORGET", "Neighbours"]
 Floats = NDArray[np.float64]
 
 FORGET = 30.0
-"""An aircraft that was not heard for so long may be anywhere, and is no longer reckoned with [s]."""
+"""Who was not heard for so long may be anywhere, and is no longer reckoned with [s]."""
 
 _STEP, _HORIZON = 0.25, 20.0  # of the times for which places are expected [s]
 _BUFFER = 4.0  # beside the separation: what a decision step and an autopilot leave open [m]
@@ -65,9 +65,7 @@ class Neighbours:
         self._limits = limits([airframe])
         self._heard: dict[int, _Heard] = {}
 
-    def step(
-        self, time: float, heartbeats: Iterable[Heartbeat], wind: tuple[float, float]
-    ) -> None:
+    def step(self, time: float, heartbeats: Iterable[Heartbeat], wind: tuple[float, float]) -> None:
         """Take note of what was heard, and forget who was not heard for too long.
 
         Parameters

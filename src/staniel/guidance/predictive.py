@@ -23,7 +23,7 @@ from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.drift import Drift
 from staniel.guidance.neighbours import Neighbours
 from staniel.guidance.surroundings import Surroundings
-from staniel.kernels.avoidance import Bans, Choice, Others, Rules, choose, ways
+from staniel.kernels.avoidance import Bans, Choice, Others, Rules, badness, choose, ways
 from staniel.kernels.flight import LINE
 from staniel.kernels.occupancy import Tops
 
@@ -102,19 +102,19 @@ class Predictive:
         if not clear or choice.harm.any():
             rows, longer = alternatives(pose, level, wanted, airframe, self._heading, self._escape)
             choice, _ = self._choose(pose, rows, longer, goal, tops, others)
-        guard = "avoid" if choice.index else ""
+        guard = "avoid" if choice.row else ""
         if choice.harm.any():
             resorts = last_resorts(pose, level, airframe, self._escape)
             other, _ = self._choose(pose, resorts, np.ones(len(resorts)), goal, tops, others)
-            if _harm(other) < _harm(choice):
+            if badness(other.harm) < badness(choice.harm):
                 choice, rows = other, resorts
             guard = "loiter" if choice.harm.any() else "avoid"
-        row = rows[choice.index]
+        row = rows[choice.row]
         self._escape, self._heading = choice.escape, None
         if guard and row[0] == LINE:
             self._heading = math.atan2(row[6] - row[4], row[5] - row[3])
         drift.expect(choice.height, choice.climb)
-        return (command if row is rows[0] and not guard else decode(row)), guard
+        return decode(row) if guard else command, guard
 
     def _choose(
         self,
@@ -135,11 +135,6 @@ class Predictive:
         cost += _SHORT * speed * (FORESIGHT - clear) + _BANNED * banned
         order = np.argsort(cost, kind="stable")
         return choose(state, climb, rows, order, speed, *common), bool(clear[0] >= FORESIGHT)
-
-
-def _harm(choice: Choice) -> float:
-    walls, near, banned = choice.harm.tolist()
-    return 1e4 * walls + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * banned
 
 
 def bans(regions: Sequence[RiskRegion], config: GuidanceConfig) -> Bans:

@@ -38,7 +38,9 @@ class Surroundings:
         roof, or unknown.
     """
 
-    def __init__(self, chart: City, clearance: float, reach: float, safe_altitude: float | None) -> None:
+    def __init__(
+        self, chart: City, clearance: float, reach: float, safe_altitude: float | None
+    ) -> None:
         n = 2 * math.ceil(REACH / CELL)
         self._window = Window(*(np.full((n, n), fill, np.float32) for fill in _EMPTY))
         self._corner = np.full(2, -(2**40))

@@ -19,7 +19,7 @@ from staniel.kernels.occupancy import Tops
 from staniel.kernels.risk import Regions
 from staniel.kernels.threats import is_near
 
-__all__ = ["Bans", "Choice", "Others", "Rules", "choose", "ways", "warm"]
+__all__ = ["Bans", "Choice", "Others", "Rules", "badness", "choose", "warm", "ways"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -73,7 +73,7 @@ class Rules(NamedTuple):
 class Choice(NamedTuple):
     """What to fly."""
 
-    index: int
+    row: int
     """Row of the command."""
     escape: Floats
     """(COMMAND_WIDTH,) what to fly afterwards, if nothing better is found."""
@@ -172,10 +172,19 @@ def _fly_out(
 
 
 @njit(cache=True, error_model="numpy")
-def _total(harm: Floats) -> float:
+def badness(harm: Floats) -> float:
     """One number for what is wrong: walls and real nearness of others first, then bans.
 
     Of the distance to keep from others more than half is for what nobody expects of them.
+
+    Parameters
+    ----------
+    harm : (3,) float array
+        As in `Choice`.
+
+    Returns
+    -------
+    float
     """
     near = harm[_NEAR]
     total: float = 1e4 * harm[_WALL] + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
@@ -267,7 +276,21 @@ def ways(
             count = rules.substeps if k == 0 else 1
             row = commands[c]
             rate, first = _fly_out(
-                own, rate, row, limits, wind, time, dt, count, tops, False, others, 1e9, bans, 0, harm
+                own,
+                rate,
+                row,
+                limits,
+                wind,
+                time,
+                dt,
+                count,
+                tops,
+                False,
+                others,
+                1e9,
+                bans,
+                0,
+                harm,
             )
             time += count * dt
             if first < np.inf and clear[c] >= rules.foresight:
@@ -327,9 +350,10 @@ def choose(
             own, harm = there.copy(), first_harm.copy()
             _fly_out(
                 own, rate, circles[e], limits, wind, rules.dt * rules.substeps, rules.stride,
-                int(seconds[e] / rules.stride), tops, True, others, rules.apart_for, bans, within, harm,
+                int(seconds[e] / rules.stride), tops, True, others, rules.apart_for, bans, within,
+                harm,
             )  # fmt: skip
-            total = _total(harm)
+            total = badness(harm)
             if total < least:
                 best, least, least_harm = c, total, harm
                 best_escape, best_height, best_climb = circles[e].copy(), there[2], rate
@@ -344,7 +368,9 @@ def warm() -> None:
     commands, state = np.zeros((1, COMMAND_WIDTH)), np.array([2.0, 2.0, 80.0, 0.0, 0.0, 15.0])
     commands[0, 1] = 15.0
     cells = np.zeros((4, 4), dtype=np.float32)
-    none = Regions(np.zeros((0, 6)), np.zeros((0, 3)), np.zeros(1, dtype=np.int64), np.zeros((0, 2)))
+    none = Regions(
+        np.zeros((0, 6)), np.zeros((0, 3)), np.zeros(1, dtype=np.int64), np.zeros((0, 2))
+    )
     common = (
         limits,
         np.zeros(2),

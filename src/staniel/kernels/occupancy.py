@@ -91,7 +91,9 @@ def forget(
             top = -np.inf
             if charted:
                 for k in range(9):  # corners, middles of sides, middle
-                    building = inside(walls, (i + 0.5 * (k % 3)) * cell, (j + 0.5 * (k // 3)) * cell)
+                    building = inside(
+                        walls, (i + 0.5 * (k % 3)) * cell, (j + 0.5 * (k // 3)) * cell
+                    )
                     if building >= 0:
                         top = max(top, roofs[building] + margin)
             window.roof[a, b] = top
@@ -199,7 +201,7 @@ def tops(
     Returns
     -------
     Tops
-        Of what nobody has looked at one cell more is closed, but for the aircraft's own ones.
+        The cells next to the aircraft count as looked at: it is there.
     """
     n = window.passed.shape[0]
     known, unseen = np.empty((n, n), dtype=np.float32), np.empty((n, n), dtype=np.float32)
@@ -216,15 +218,15 @@ def tops(
                 over = passed - _TOUCHING if passed < np.inf else high
             unseen[i, j] = max(top, min(over, high))
     own_i, own_j = math.floor(x / cell) - corner[0], math.floor(y / cell) - corner[1]
-    for i in range(max(own_i - 2, 0), min(own_i + 3, n)):
-        for j in range(max(own_j - 2, 0), min(own_j + 3, n)):
+    for i in range(max(own_i - 3, 0), min(own_i + 4, n)):
+        for j in range(max(own_j - 3, 0), min(own_j + 4, n)):
             unseen[i, j] = known[i, j]
+    # Both by as much, so that a wall that comes into sight closes nothing that was open. A return
+    # is within 0.7 cells of the middle of its own.
+    radius = clearance / cell + 0.7
     solid, closed = known.copy(), unseen.copy()
-    _grow(known, solid, clearance / cell + 0.7)  # a return is within 0.7 cells of its middle
-    _grow(unseen, closed, 1.0)
-    for i in range(n):
-        for j in range(n):
-            closed[i, j] = max(closed[i, j], solid[i, j])
+    _grow(known, solid, radius)
+    _grow(unseen, closed, radius)
     return Tops(solid, closed, corner[0] * cell, corner[1] * cell, cell)
 
 

@@ -103,8 +103,8 @@ def is_near(
         if held == outside:
             rim_x, rim_y = _rim(regions, k, x, y)
             near = (rim_x - x) ** 2 + (rim_y - y) ** 2 < margin * margin
-            held = held != near
-    return held != outside
+            held = bool(held != near)
+    return bool(held != outside)
 
 
 @njit(cache=True, error_model="numpy")
