@@ -7,11 +7,13 @@ that went wrong can be flown again: ``--first 17 --missions 1``.
 """
 
 import argparse
+import json
 import multiprocessing
 import statistics
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,7 +47,7 @@ class Outcome:
     avoided: float
     stuck: float
     high: float
-    seen: float
+    low: float
 
 
 def scenario_of(number: int, policy: str, minutes: float) -> Scenario:
@@ -134,7 +136,7 @@ def fly(number: int, policy: str, minutes: float) -> Outcome:
         guards.count("avoid") / len(guards),
         guards.count("loiter") / len(guards),
         float((places[:, :, 2] > layer + 2.0).mean()),
-        0.0,
+        float((places[:, :, 2] < city.tallest).mean()),
     )
 
 
@@ -146,7 +148,7 @@ def report(outcomes: Sequence[Outcome]) -> None:
     """Counts by group, with the upper end of a 95 % interval for the share of missions."""
     table = Table(
         "group", "missions", "strikes", "below 10 m", "entries", "nearest [m]", "avoiding",
-        "no safe command", "above its height",
+        "no safe command", "above its height", "below the tallest roof",
     )  # fmt: skip
     groups = sorted({outcome.group for outcome in outcomes})
     for group in [*groups, "all"]:
@@ -161,6 +163,7 @@ def report(outcomes: Sequence[Outcome]) -> None:
             f"{statistics.fmean(row.avoided for row in rows):.1%}",
             f"{statistics.fmean(row.stuck for row in rows):.2%}",
             f"{statistics.fmean(row.high for row in rows):.1%}",
+            f"{statistics.fmean(row.low for row in rows):.1%}",
         )
     CONSOLE.print(table)
     for outcome in outcomes:
@@ -184,6 +187,7 @@ def main() -> None:
         "--policy", default="predictive", choices=["predictive", "saunders", "none"]
     )
     parser.add_argument("--processes", type=int, default=multiprocessing.cpu_count())
+    parser.add_argument("--log", type=Path, help="each outcome, as a line of JSON")
     arguments = parser.parse_args()
     warm_all(lambda done, total: None, ["lidar", "risk", "threats", "occupancy", "avoidance"])
     started = time.perf_counter()
@@ -192,7 +196,12 @@ def main() -> None:
         for number in range(arguments.first, arguments.first + arguments.missions)
     ]
     with multiprocessing.get_context("fork").Pool(arguments.processes) as pool:
-        outcomes = list(pool.imap(_fly, tasks, chunksize=1))
+        outcomes = []
+        for outcome in pool.imap(_fly, tasks, chunksize=1):
+            outcomes.append(outcome)
+            if arguments.log is not None:
+                with arguments.log.open("a") as log:
+                    log.write(json.dumps(asdict(outcome)) + "\n")
     report(outcomes)
     CONSOLE.print(f"{len(outcomes)} missions in {time.perf_counter() - started:.0f} s")
 
