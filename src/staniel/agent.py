@@ -16,7 +16,7 @@ from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMa
 from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyBanks, FlyLine
-from staniel.datatypes.equipment import Airframe, Camera
+from staniel.datatypes.equipment import Airframe, Camera, Lidar
 from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
 from staniel.guidance import (
@@ -25,6 +25,7 @@ from staniel.guidance import (
     NoFeasibleFlightError,
     Partner,
     Pursuit,
+    avoidance_for,
     loiter,
     pursuit_policy_named,
     safe_loiter,
@@ -52,6 +53,7 @@ class Briefing:
     guidance: GuidanceConfig
     risk: tuple[RiskRegion, ...] = ()
     carried: CarriedThreat | None = None
+    lidar: Lidar = Lidar()  # noqa: RUF009 - frozen
 
 
 class Agent:
@@ -93,6 +95,9 @@ class Agent:
             briefing.risk, briefing.carried, speed=briefing.tracking.max_speed
         )
         self._memory: dict[str, Any] = {}
+        self._avoidance = avoidance_for(
+            id, airframe, clock, briefing.chart, briefing.lidar, briefing.guidance
+        )
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
         self.belief = Belief((), "search", None, (0.0, 0.0))
@@ -115,22 +120,35 @@ class Agent:
             To be broadcast; heard in the next step at the earliest.
         """
         time, pose = percept.time, percept.pose
-        told = [message.threats for message in inbox if isinstance(message, Warn)]
-        news = self.dangers.step(time, percept.threats, told)
+        warned = [message.threats for message in inbox if isinstance(message, Warn)]
+        news = self.dangers.step(time, percept.threats, warned)
         tracks = self._track(percept, inbox)
         outbox = self._allocate(percept, tracks, inbox)
         command, role, goal = self._fly(time, pose, inbox, outbox)
+        command, guard = self._avoid(percept, inbox, command)
         if percept.sightings:
             outbox.append(
                 Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
-        plan = command if role in ("pursue", "help") and isinstance(command, FlyBanks) else None
-        outbox.append(self._allocation.heartbeat(role, goal, self._helping.target, plan))
+        # Partners and those who avoid one another want to know what is flown.
+        planned = role in ("pursue", "help") and isinstance(command, FlyBanks)
+        told = command if planned or self._avoidance is not None else None
+        outbox.append(self._allocation.heartbeat(role, goal, self._helping.target, told))
         held = self._allocation.holding
-        self.belief = Belief(self._tracker.estimates, role, None if held is None else held.id, goal)
+        target = None if held is None else held.id
+        self.belief = Belief(self._tracker.estimates, role, target, goal, guard)
         return command, outbox
+
+    def _avoid(
+        self, percept: Percept, inbox: Sequence[Message], command: Command
+    ) -> tuple[Command, str]:
+        """What was decided, or what is safe in its place."""
+        if self._avoidance is None:
+            return command, ""
+        heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
+        return self._avoidance.step(percept, heartbeats, self.dangers.regions, command)
 
     def _track(self, percept: Percept, inbox: Sequence[Message]) -> list[TrackEstimate]:
         """Own sightings and those of the others, fused in one tracker."""
@@ -250,7 +268,11 @@ class Agent:
             config=briefing.guidance,
             dangers=self.dangers.at(time, self._tracker.estimates),
             partners=tuple(
-                Partner(beat.time, beat.pose, beat.plan)
+                Partner(
+                    beat.time,
+                    beat.pose,
+                    beat.command if isinstance(beat.command, FlyBanks) else None,
+                )
                 for beat in self._helping.partners(track.id)
             ),
             memory=self._memory,

@@ -83,7 +83,7 @@ COMMAND_DTYPE = _columns(
 THREAT_DTYPE = _columns("time:f8 agent:i4 kind:U8 origin:i4 x:f8 y:f8 cxx:f8 cxy:f8 cyy:f8")
 _SAME = 1e-6  # instants this near to each other are one [s]
 
-DECISION_DTYPE = _columns("time:f8 agent:i4 role:U8 target:U16 goal_x:f8 goal_y:f8")
+DECISION_DTYPE = _columns("time:f8 agent:i4 role:U8 target:U16 goal_x:f8 goal_y:f8 guard:U8")
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.equipment import Airframe
 from staniel.guidance import PathState, follow
 from staniel.kernels.flight import fly
-from staniel.world.aircraft import encode, limits
 
 AIRFRAME = Airframe()
 

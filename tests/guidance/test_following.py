@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import staniel
 from staniel.angles import wrap, wrap_array
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.command import FlyLine, FlyOrbit
 from staniel.datatypes.equipment import GRAVITY, Airframe
 from staniel.errors import ScenarioError
@@ -28,7 +29,6 @@ from staniel.kernels import following
 from staniel.kernels.flight import fly
 from staniel.scenario import build_city
 from staniel.scenario.assemble import assemble
-from staniel.world.aircraft import encode, limits
 
 AIRFRAME = Airframe()
 V = AIRFRAME.speed

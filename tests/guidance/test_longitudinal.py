@@ -8,11 +8,11 @@ import scipy.signal
 from hypothesis import given
 from hypothesis import strategies as st
 
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.command import FlyLine
 from staniel.datatypes.equipment import Airframe
 from staniel.guidance.longitudinal import altitude_command, altitude_zone, line_altitude
 from staniel.kernels.flight import fly
-from staniel.world.aircraft import encode, limits
 
 numbers = st.floats(-300.0, 300.0)
 

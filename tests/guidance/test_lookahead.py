@@ -177,7 +177,7 @@ def test_a_helper_joins_by_message_and_two_runs_are_the_same():
         for delivery in frame.deliveries
         if delivery.message.kind == "heartbeat"
     ]
-    assert any(beat.helps is not None and beat.plan is not None for beat in beats)
-    assert any(beat.target is not None and beat.plan is not None for beat in beats)
+    assert any(beat.helps is not None and beat.command is not None for beat in beats)
+    assert any(beat.target is not None and beat.command is not None for beat in beats)
     alone = flown(minutes=2.0, seed=1, guidance={"pursuit": "lookahead"})
     assert not any(belief.role == "help" for frame in alone for belief in frame.beliefs)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from staniel.angles import wrap
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.command import FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import GRAVITY, Airframe, turn_radius
 from staniel.kernels.flight import MAX_BANKS, fly
-from staniel.world.aircraft import encode, limits
 
 AIRFRAME = Airframe()
 LIMITS = limits([AIRFRAME])[0]

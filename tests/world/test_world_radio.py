@@ -82,3 +82,25 @@ def test_who_else_flies_or_talks_changes_nothing():
 def test_silence():
     radio = Radio(RadioSet(), np.uint64(0))
     assert radio.deliver([[], []], truth_at([(0, 0, 0), (1, 0, 0)])) == ([[], []], [])
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.5, 1.0])
+def test_a_share_is_lost_whatever_the_distance(loss):
+    chance = (1.0 - loss) * math.exp(-(400.0**2) / (2 * 800.0**2))
+    radio = Radio(RadioSet(loss=loss), np.uint64(11))
+    truth = truth_at([(0.0, 0.0, 80.0), (400.0, 0.0, 80.0), (0.0, 0.0, 80.0)])
+    inboxes, _ = radio.deliver([said(0, 5000), [], []], truth)
+    assert stats.binomtest(len(inboxes[1]), 5000, chance).pvalue > 0.01
+    assert stats.binomtest(len(inboxes[2]), 5000, 1.0 - loss).pvalue > 0.01
+
+
+def test_more_loss_loses_more_of_the_same_and_none_changes_nothing():
+    truth = truth_at([(0.0, 0.0, 80.0), (400.0, 0.0, 80.0)])
+    heard = [
+        {
+            message.sequence
+            for message in Radio(radio, np.uint64(3)).deliver([said(0, 900), []], truth)[0][1]
+        }
+        for radio in (RadioSet(), RadioSet(loss=0.0), RadioSet(loss=0.3), RadioSet(loss=0.6))
+    ]
+    assert heard[0] == heard[1] > heard[2] > heard[3]

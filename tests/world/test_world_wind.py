@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from staniel.angles import wrap
 from staniel.city import City
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import GRAVITY, Airframe
@@ -17,7 +18,6 @@ from staniel.errors import ScenarioError
 from staniel.kernels.flight import fly
 from staniel.kernels.gusts import blow
 from staniel.world import Traffic, Wind, World
-from staniel.world.aircraft import encode, limits
 from staniel.world.wind import dryden, mean_wind
 
 LIMITS = limits([Airframe()])

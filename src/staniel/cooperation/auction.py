@@ -22,7 +22,7 @@ from typing import Any
 
 from staniel.cooperation.config import CooperationConfig
 from staniel.datatypes.belief import Pose, TrackId
-from staniel.datatypes.command import FlyBanks
+from staniel.datatypes.command import Command
 from staniel.datatypes.message import (
     Announce,
     Award,
@@ -165,7 +165,7 @@ class Allocation:
         role: str,
         goal: Point,
         helps: TrackId | None = None,
-        plan: FlyBanks | None = None,
+        command: Command | None = None,
     ) -> Heartbeat:
         """The message that tells the others where the agent is and renews its lease."""
         holding = self.holding
@@ -185,7 +185,7 @@ class Allocation:
             else (holding.position if task is None else task.position),
             cost=self._said_cost,
             helps=helps,
-            plan=plan,
+            command=command,
         )
 
     def give_up(self) -> Release:

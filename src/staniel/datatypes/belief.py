@@ -164,9 +164,13 @@ class Belief:
         The track it is responsible for.
     goal : (float, float) [m]
         Where it is heading.
+    guard : str
+        What avoidance made of it: ``""`` where it flies what it decided, ``"avoid"`` where it flies
+        something else that is safe, ``"loiter"`` where it found nothing that it knows to be safe.
     """
 
     tracks: Sequence[TrackEstimate]
     role: str
     target: TrackId | None
     goal: tuple[float, float]
+    guard: str = ""

@@ -169,6 +169,7 @@ class RadioSet(Config):
     duplication: Share = Field(0.0, description="probability that a message heard comes twice")
     bandwidth: NotNegative = Field(0.0, description="of each sender [byte/s]; 0: no limit")
     queue_limit: int = Field(100, ge=1, le=100_000, description="messages waiting at a sender")
+    loss: Share = Field(0.0, description="share lost whatever the distance")
     building_loss: Share = Field(0.0, description="share lost through buildings, beside distance")
     partitions: tuple[Partition, ...] = Field(
         (), max_length=1000, description="when the team is cut into groups: start, end, groups"

@@ -7,7 +7,7 @@ first two a receiver recognises a copy. The auction's words are those of thesis 
 from dataclasses import dataclass
 
 from staniel.datatypes.belief import Pose, Sighting, TrackId
-from staniel.datatypes.command import FlyBanks
+from staniel.datatypes.command import Command
 from staniel.datatypes.threats import Threats
 
 __all__ = [
@@ -45,8 +45,8 @@ class Message:
 class Heartbeat(Message):
     """I am alive, here, doing this. A held target's award is a lease that this renews.
 
-    `helps` is the target that the sender watches beside its holder; `plan` is what it is about to
-    fly from `pose` on, where it pursues a target by a sequence of banks.
+    `helps` is the target that the sender watches beside its holder; `command` is what it flies from
+    `pose` on, where partners or those who avoid it want to know.
     """
 
     pose: Pose
@@ -56,7 +56,7 @@ class Heartbeat(Message):
     target_position: Point | None
     cost: float
     helps: TrackId | None = None
-    plan: FlyBanks | None = None
+    command: Command | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,9 @@ head           16: kind 1, length 1, sender 2, sequence 4, time 8; every message
 track name     14: born 8, founder 2, serial 4
 point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
-heartbeat      head, pose, role 1, goal, track name, point, cost; where it helps a track name, and
-               where it tells its plan hold 4, count 1, speed 4 and for each bank 2
+heartbeat      head, pose, role 1, goal, track name, point, cost; where it helps a track name; and
+               for a command 29: kind 1, seven 4-byte numbers, or of banks 13: kind 1, hold, speed
+               and height, and 1 for their count and 2 for each
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
 warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
                each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,
@@ -25,6 +26,7 @@ release        head, track name, point, lost 1
 
 from typing import Final
 
+from staniel.datatypes.command import Command, FlyBanks
 from staniel.datatypes.message import (
     Announce,
     Award,
@@ -49,7 +51,7 @@ SIGHTING: Final = 54
 CARRIER: Final = 38
 """What each carrier adds to a warning [byte]."""
 
-_NAME, _POINT, _COST, _POSE, _REGION, _DISC = 14, 8, 4, 24, 15, 12
+_NAME, _POINT, _COST, _POSE, _REGION, _DISC, _COMMAND = 14, 8, 4, 24, 15, 12, 29
 
 _SIZES: Final[dict[type[Message], int]] = {
     Heartbeat: HEAD + _POSE + 1 + _POINT + _NAME + _POINT + _COST,
@@ -72,16 +74,22 @@ def wire_size(message: Message) -> int:
     16
     """
     size = _SIZES.get(type(message), HEAD)
-    if isinstance(message, Report):
+    if isinstance(message, Heartbeat):
+        size += _NAME if message.helps is not None else 0
+        size += _command_size(message.command)
+    elif isinstance(message, Report):
         size += SIGHTING * len(message.sightings)
     elif isinstance(message, Warn):
         size += CARRIER * len(message.threats.carriers)
         size += sum(map(_region_size, message.threats.regions))
-    elif isinstance(message, Heartbeat):
-        size += _NAME if message.helps is not None else 0
-        size += 9 + 2 * len(message.plan.banks) if message.plan is not None else 0
     return size
 
 
 def _region_size(region: RiskRegion) -> int:
     return _REGION + (_DISC if region.polygon is None else _POINT * len(region.polygon))
+
+
+def _command_size(command: Command | None) -> int:
+    if isinstance(command, FlyBanks):
+        return 14 + 2 * len(command.banks)
+    return 0 if command is None else _COMMAND

@@ -1,5 +1,6 @@
-"""How to fly it: paths and how to follow them, loiters and pursuit policies, known dangers."""
+"""How to fly it: paths, how to follow them, pursuit policies, avoidance, and known dangers."""
 
+from staniel.guidance.avoidance import Avoidance, avoidance_for
 from staniel.guidance.config import GuidanceConfig, LookaheadConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers, KnownDangers
 from staniel.guidance.dubins import Paths, Word, shortest
@@ -32,6 +33,7 @@ from staniel.guidance.pursuit import (
 
 __all__ = [
     "NO_DANGERS",
+    "Avoidance",
     "Dangers",
     "Follower",
     "GuidanceConfig",
@@ -46,6 +48,7 @@ __all__ = [
     "Pursuit",
     "WindPath",
     "Word",
+    "avoidance_for",
     "best_radius",
     "carrot",
     "carrot_line",

@@ -1,7 +1,7 @@
 """Coordinated-turn flight: many aircraft, many dynamics steps, one call.
 
 Columns of a state row: x, y, z, heading, bank, speed. Columns of a command row (what
-`staniel.world.aircraft.encode` writes): kind, speed, altitude, then
+`staniel.datatypes.autopilot.encode` writes): kind, speed, altitude, then
 
 - `LINE`: start x, start y, end x, end y;
 - `ORBIT`: center x, center y, radius, turn (+1 counter-clockwise);
@@ -23,7 +23,17 @@ from numpy.typing import NDArray
 
 from staniel.kernels.following import line_rate, orbit_rate, wrapped
 
-__all__ = ["BANKS", "COMMAND_WIDTH", "LINE", "MAX_BANKS", "ORBIT", "fly", "lagged", "warm"]
+__all__ = [
+    "BANKS",
+    "COMMAND_WIDTH",
+    "LINE",
+    "MAX_BANKS",
+    "ORBIT",
+    "fly",
+    "fly_step",
+    "lagged",
+    "warm",
+]
 
 Array = NDArray[np.float64]
 
@@ -149,6 +159,42 @@ def _step(
 
 
 @njit(cache=True, error_model="numpy")
+def fly_step(
+    state: Array,
+    climb: float,
+    command: Array,
+    limits: Array,
+    east: float,
+    north: float,
+    elapsed: float,
+    dt: float,
+) -> float:
+    """One dynamics step of one aircraft, in place, as `fly` does it.
+
+    Parameters
+    ----------
+    state : (6,) float array
+        Changed.
+    climb : float [m/s]
+    command : (`COMMAND_WIDTH`,) float array
+    limits : (11,) float array
+    east, north : float [m/s]
+        The wind.
+    elapsed : float [s]
+        Since the command was given.
+    dt : float [s]
+
+    Returns
+    -------
+    climb : float [m/s]
+        After the step.
+    """
+    _step(state, command, limits, east, north, elapsed, dt)
+    state[2], after = _climbed(state[2], climb, command[2], limits, dt)
+    return after
+
+
+@njit(cache=True, error_model="numpy")
 def fly(
     aircraft: Array,
     climbs: Array,
@@ -201,8 +247,8 @@ def fly(
     for i in range(n):
         state = aircraft[i].copy()
         for k in range(substeps):
-            _step(state, commands[i], limits[i], wind[k, i, 0], wind[k, i, 1], k * dt, dt)
-            state[2], after[i] = _climbed(state[2], after[i], commands[i, 2], limits[i], dt)
+            east, north = wind[k, i, 0], wind[k, i, 1]
+            after[i] = fly_step(state, after[i], commands[i], limits[i], east, north, k * dt, dt)
             for c in range(6):  # a row at once costs seconds to compile
                 path[k, i, c] = state[c]
     return path, after

@@ -18,6 +18,7 @@ def hear(
     sequences: NDArray[np.int64],
     sigma: float,
     reach: float,
+    loss: float,
     key: np.uint64,
 ) -> NDArray[np.bool_]:
     r"""Draw who hears each message.
@@ -34,6 +35,9 @@ def hear(
     sigma : float [m]
     reach : float [m]
         Nothing is heard beyond.
+    loss : float
+        Probability that a message is lost whatever the distance. The draw is the same for each
+        `loss`: what is heard with more of it is heard with less.
     key : uint64
 
     Returns
@@ -43,8 +47,8 @@ def hear(
 
     Notes
     -----
-    :math:`p = e^{-d^2/2\sigma^2}` up to `reach`, 0 beyond; d the distance in space. Thesis eq. 3.5
-    (corrected).
+    :math:`p = (1 - loss) e^{-d^2/2\sigma^2}` up to `reach`, 0 beyond; d the distance in space.
+    Thesis eq. 3.5 (corrected), with the loss as a factor.
     """
     m, n = senders.shape[0], aircraft.shape[0]
     heard = np.zeros((m, n), dtype=np.bool_)
@@ -57,7 +61,7 @@ def hear(
             dz = aircraft[i, 2] - aircraft[sender, 2]
             square = dx * dx + dy * dy + dz * dz
             if i != sender and square <= reach * reach:
-                chance = math.exp(-0.5 * square / (sigma * sigma))
+                chance = math.exp(-0.5 * square / (sigma * sigma)) * (1.0 - loss)
                 heard[j, i] = uniform(stream, i) < chance
     return heard
 
@@ -117,5 +121,5 @@ def fates(
 def warm() -> None:
     """Compile, or load from the disk cache, what this module is flown with."""
     index = np.zeros(1, dtype=np.int64)
-    heard = hear(np.zeros((1, 6)), index, index, 1.0, 1.0, np.uint64(0))
+    heard = hear(np.zeros((1, 6)), index, index, 1.0, 1.0, 0.0, np.uint64(0))
     fates(heard, heard, index, index, 0.0, 0.0, False, 0.0, np.uint64(0))

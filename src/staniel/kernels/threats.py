@@ -13,7 +13,7 @@ from staniel.kernels.polygon import in_polygon
 from staniel.kernels.random import fold, uniform
 from staniel.kernels.risk import Regions
 
-__all__ = ["inside_regions", "nearest_points", "reach_chances", "sensor_draws", "warm"]
+__all__ = ["inside_regions", "is_near", "nearest_points", "reach_chances", "sensor_draws", "warm"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -42,10 +42,19 @@ def _nearest(regions: Regions, k: int, x: float, y: float) -> tuple[float, float
     """The point of region k's ground shape that is nearest to (x, y)."""
     if _within(regions, k, x, y):
         return x, y
+    return _rim(regions, k, x, y)
+
+
+@njit(cache=True, error_model="numpy")
+def _rim(regions: Regions, k: int, x: float, y: float) -> tuple[float, float]:
+    """The point of the outline of region k's ground shape that is nearest to (x, y)."""
     radius = regions.disc[k, 2]
     if radius > 0.0:
         cx, cy = regions.disc[k, 0], regions.disc[k, 1]
-        share = radius / math.hypot(x - cx, y - cy)
+        away = math.hypot(x - cx, y - cy)
+        if away == 0.0:
+            return cx + radius, cy
+        share = radius / away
         return cx + share * (x - cx), cy + share * (y - cy)
     corners = regions.corners[regions.first[k] : regions.first[k + 1]]
     n = corners.shape[0]
@@ -63,6 +72,39 @@ def _nearest(regions: Regions, k: int, x: float, y: float) -> tuple[float, float
             least, best_x, best_y = distance, nx, ny
         px, py = qx, qy
     return best_x, best_y
+
+
+@njit(cache=True, error_model="numpy")
+def is_near(
+    regions: Regions, k: int, x: float, y: float, z: float, margin: float, outside: bool
+) -> bool:
+    """Whether a place is in region k grown by a margin; or not in it shrunk by the margin.
+
+    Parameters
+    ----------
+    regions : Regions
+    k : int
+    x, y, z : float [m]
+    margin : float [m]
+        Level distance; heights are grown, or shrunk, by as much.
+    outside : bool
+        What is asked for is the complement of the region.
+
+    Returns
+    -------
+    bool
+    """
+    box = regions.box[k]
+    grown = -margin if outside else margin
+    held = box[4] - grown <= z <= box[5] + grown
+    held = held and box[0] - grown <= x <= box[1] + grown and box[2] - grown <= y <= box[3] + grown
+    if held:
+        held = _within(regions, k, x, y)
+        if held == outside:
+            rim_x, rim_y = _rim(regions, k, x, y)
+            near = (rim_x - x) ** 2 + (rim_y - y) ** 2 < margin * margin
+            held = bool(held != near)
+    return bool(held != outside)
 
 
 @njit(cache=True, error_model="numpy")

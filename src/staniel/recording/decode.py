@@ -347,4 +347,5 @@ def _command(time: float, item: Mapping[str, Any]) -> Row:
 
 def _decision(time: float, item: Mapping[str, Any]) -> Row:
     x, y = item["goal"]
-    return time, item["agent"], _text(item["role"], 8), _text(item["target"], 16), x, y
+    guard = _text(item.get("guard", ""), 8)
+    return time, item["agent"], _text(item["role"], 8), _text(item["target"], 16), x, y, guard

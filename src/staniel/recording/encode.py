@@ -266,4 +266,5 @@ def _command(agent: int, command: Command) -> str:
 
 
 def _decision(agent: int, belief: Belief) -> str:
-    return _DECISION % (agent, belief.role, _name(belief.target), *belief.goal)
+    text = _DECISION % (agent, belief.role, _name(belief.target), *belief.goal)
+    return f'{text[:-1]},"guard":"{belief.guard}"}}' if belief.guard else text

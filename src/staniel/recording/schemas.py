@@ -160,6 +160,7 @@ _DECISION = _object(
     target=_or_null(_string("track it is responsible for, founder-serial")),
     goal=_POINT,
 )
+_DECISION["properties"]["guard"] = _string("avoid or loiter: not what was decided; absent: it is")
 _CLOCK = _object(decision_step=_number("[s]"), dynamics_step=_number("[s]"))
 
 _TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})

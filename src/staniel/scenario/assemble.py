@@ -57,6 +57,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         guidance=scenario.guidance,
         risk=scenario.risk.briefed,
         carried=scenario.risk.carried.briefing,
+        lidar=scenario.lidar,
     )
     world = World(
         city,
@@ -71,6 +72,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         airframes=airframes,
         following=scenario.guidance.following,
         approach=scenario.guidance.approach,
+        low=sees_buildings(scenario),
     )
     lidar, risk = scenario.lidar, scenario.risk
     return Mission(
@@ -97,11 +99,19 @@ def assemble(scenario: Scenario, city: City) -> Mission:
     )
 
 
+def sees_buildings(scenario: Scenario) -> bool:
+    """Whether the team avoids buildings, and can see them: then it may fly below the roofs."""
+    seen = scenario.chart == "known" or scenario.lidar.mount != "none"
+    return scenario.guidance.avoidance != "none" and seen
+
+
 def kernels_of(scenario: Scenario) -> list[str]:
     """Kernel modules that this scenario calls beside those that every mission does."""
     dangerous = bool(scenario.risk.regions or scenario.risk.carried.radius)
     uses = {
         "gusts": scenario.wind.gusts,
+        "occupancy": scenario.guidance.avoidance == "predictive",
+        "avoidance": scenario.guidance.avoidance == "predictive",
         "lidar": scenario.lidar.mount != "none",
         "risk": dangerous,
         "threats": dangerous,

@@ -168,6 +168,15 @@ class Scenario(Config):
         return self
 
     @model_validator(mode="after")
+    def _what_is_avoided_can_be_seen(self) -> Self:
+        if self.guidance.avoidance == "saunders" and self.lidar.mount == "none":
+            raise ValueError(
+                'guidance.avoidance = "saunders" sees buildings by lidar alone: '
+                'expected lidar.mount = "scanner" or "rangefinder"'
+            )
+        return self
+
+    @model_validator(mode="after")
     def _groups_make_the_team(self) -> Self:
         if self.groups:
             together = sum(group.count for group in self.groups)
@@ -183,13 +192,20 @@ class Scenario(Config):
 
     @property
     def airframes(self) -> tuple[Airframe, ...]:
-        """What each aircraft of the team is, in the order of the team."""
-        if not self.groups:
-            return (self.aircraft,) * self.aircraft.count
+        """What each aircraft of the team is, in the order of the team, each in its own layer."""
+        team: tuple[Airframe, ...] = (self.aircraft,) * self.aircraft.count
+        if self.groups:
+            team = tuple(
+                airframe
+                for number, group in enumerate(self.groups)
+                for airframe in (self._kind(number, "aircraft", Airframe),) * group.count
+            )
+        spacing = self.guidance.layer_spacing
+        if spacing == 0.0:
+            return team
         return tuple(
-            airframe
-            for number, group in enumerate(self.groups)
-            for airframe in (self._kind(number, "aircraft", Airframe),) * group.count
+            airframe.model_copy(update={"altitude": airframe.altitude + spacing * number})
+            for number, airframe in enumerate(team)
         )
 
     @property

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command
 from staniel.datatypes.equipment import Airframe
@@ -22,7 +23,6 @@ from staniel.datatypes.truth import (
     nominal,
 )
 from staniel.kernels.flight import fly
-from staniel.world.aircraft import encode, limits
 from staniel.world.config import Faults, Launch, Wind
 from staniel.world.faults import Failures
 from staniel.world.launch import Pad, on_perimeter

@@ -193,7 +193,9 @@ class Radio:
 
     def _hear(self, senders: Indices, sequences: Indices, truth: Truth, working: Bools) -> Bools:
         radio = self._radio
-        heard: Bools = hear(truth.aircraft, senders, sequences, radio.sigma, radio.range, self._key)
+        heard: Bools = hear(
+            truth.aircraft, senders, sequences, radio.sigma, radio.range, radio.loss, self._key
+        )
         return heard if working.all() else heard & working
 
     # -- bandwidth -------------------------------------------------------------------------------

@@ -47,12 +47,16 @@ class World:
         How every autopilot follows lines and orbits.
     approach : float [rad], optional
         Greatest angle at which the vector field joins a line.
+    low : bool, optional
+        Aircraft avoid buildings: they may fly below the tallest roof, and begin clear of those
+        that they do not fly over.
 
     Raises
     ------
     ScenarioError
-        No aircraft, aircraft that would not fly above the tallest roof, a wind as fast as they, a
-        fault of an aircraft that is not there; roads or recorded tracks that cannot be used.
+        No aircraft, aircraft that would not fly above the tallest roof though they are not `low`
+        or begin on the ground, a wind as fast as they, no clear place to begin, a fault of an
+        aircraft that is not there; roads or recorded tracks that cannot be used.
     """
 
     def __init__(
@@ -70,12 +74,13 @@ class World:
         airframes: Sequence[Airframe] | None = None,
         following: str = "carrot",
         approach: float = math.radians(60.0),
+        low: bool = False,
     ) -> None:
         if aircraft_count < 1:
             raise ScenarioError(f"aircraft count = {aircraft_count}: expected at least 1")
         airframes = airframes or [airframe] * aircraft_count
         for one in airframes:
-            _check(one, city.tallest, wind.speed)
+            _check(one, city.tallest, wind.speed, low and launch.kind == "air")
         self._clock = clock
         own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 0))
         self._fleet = Fleet(city, airframes, clock, own, wind, faults, launch, following, approach)
@@ -143,8 +148,8 @@ class World:
         )
 
 
-def _check(airframe: Airframe, tallest: float, wind: float) -> None:
-    if airframe.altitude <= tallest:
+def _check(airframe: Airframe, tallest: float, wind: float, low: bool) -> None:
+    if airframe.altitude <= tallest and not low:
         raise ScenarioError(
             f"aircraft.altitude = {airframe.altitude:g} m: expected above the tallest roof "
             f"({tallest:g} m), since aircraft do not avoid buildings"

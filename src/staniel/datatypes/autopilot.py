@@ -11,7 +11,7 @@ from staniel.datatypes.equipment import Airframe
 from staniel.kernels.flight import BANKS, COMMAND_WIDTH, LINE, MAX_BANKS, ORBIT
 from staniel.kernels.following import FOLLOWERS
 
-__all__ = ["encode", "limits"]
+__all__ = ["decode", "encode", "limits"]
 
 
 def encode(commands: Sequence[Command]) -> NDArray[np.float64]:
@@ -42,6 +42,30 @@ def encode(commands: Sequence[Command]) -> NDArray[np.float64]:
             raise ValueError(f"command of aircraft {i} = {command}: expected finite numbers")
         rows[i, : len(row)] = row
     return rows
+
+
+def decode(row: NDArray[np.float64]) -> Command:
+    """The command of a row that `encode` could have made.
+
+    Parameters
+    ----------
+    row : (COMMAND_WIDTH,) float array
+
+    Returns
+    -------
+    Command
+
+    Examples
+    --------
+    >>> decode(encode([FlyOrbit((1.0, 2.0), 40.0, -1, 15.0, 80.0)])[0])
+    FlyOrbit(center=(1.0, 2.0), radius=40.0, turn=-1, speed=15.0, altitude=80.0)
+    """
+    kind, speed, altitude, a, b, c, d = row[:7].tolist()
+    if kind == LINE:
+        return FlyLine((a, b), (c, d), speed, altitude)
+    if kind == ORBIT:
+        return FlyOrbit((a, b), c, int(d), speed, altitude)
+    return FlyBanks(tuple(row[5 : 5 + int(b)].tolist()), a, speed, altitude)
 
 
 def _row(command: Command) -> tuple[float, ...]:
