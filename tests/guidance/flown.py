@@ -92,7 +92,16 @@ class Flown:
                 guards.append(guard)
                 said.append(
                     Heartbeat(
-                        i, self.tick, time, pose, "search", (0.0, 0.0), None, None, 0.0, command
+                        i,
+                        self.tick,
+                        time,
+                        pose,
+                        "search",
+                        (0.0, 0.0),
+                        None,
+                        None,
+                        0.0,
+                        command=command,
                     )
                 )
             air = np.empty((CLOCK.substeps, n, 2))
