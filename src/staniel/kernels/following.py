@@ -248,7 +248,7 @@ def field_orbit_courses(
 
 
 def warm() -> None:
-    """Compile, or load from the disk cache, the laws on many places; `flight` warms the others."""
+    """Compile, or load from the disk cache, what no mission calls; `flight` warms the rest."""
     places = np.zeros((1, 2))
     carrot_line_courses(places, 0.0, 0.0, 1.0, 0.0, 1.0)
     field_line_courses(places, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0)

@@ -13,7 +13,6 @@ ALWAYS = (
     "footprint",
     "camera",
     "flight",
-    "following",
     "streets",
     "traffic",
     "radio",
