@@ -13,8 +13,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["SAGITTA", "Cells", "advanced", "line_cost", "piece_cost", "warm", "warm_cells"]
+__all__ = [
+    "SAGITTA",
+    "Cells",
+    "advanced",
+    "line_cost",
+    "lines_cost",
+    "piece_cost",
+    "warm",
+    "warm_cells",
+]
 
+Floats = NDArray[np.float64]
 Prices = NDArray[np.float32]
 
 SAGITTA = 0.05
@@ -89,6 +99,15 @@ def line_cost(cells: Cells, ax: float, ay: float, bx: float, by: float) -> float
 
 
 @njit(cache=True, error_model="numpy")
+def lines_cost(cells: Cells, a: Floats, b: Floats) -> Floats:
+    """(n,) `line_cost` of the straight ways from places a (n, 2) to places b (n, 2)."""
+    costs = np.empty(a.shape[0])
+    for k in range(a.shape[0]):
+        costs[k] = line_cost(cells, a[k, 0], a[k, 1], b[k, 0], b[k, 1])
+    return costs
+
+
+@njit(cache=True, error_model="numpy")
 def advanced(
     x: float, y: float, course: float, bend: float, length: float
 ) -> tuple[float, float, float]:
@@ -154,5 +173,6 @@ def warm_cells() -> Cells:
 def warm() -> None:
     """Compile, or load from the cache, what this module is called with."""
     line_cost(warm_cells(), 0.5, 0.5, 1.5, 1.5)
+    lines_cost(warm_cells(), np.ones((1, 2)), np.ones((1, 2)))
     piece_cost(warm_cells(), 0.5, 0.5, 0.0, 1.0, 0.5)
     advanced(0.0, 0.0, 0.0, 0.0, 1.0)

@@ -27,6 +27,8 @@ _WHAT = {BUILDING: "a building", NO_FLY: "a no-fly region", WALL: "a wall that a
 
 MOST_CELLS = 4_000_000
 
+_HAIR = 1e-9  # a cell just as far off as the clearance is free [m]
+
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
@@ -176,7 +178,7 @@ class Obstacles:
             y = self.south + self.cell * np.arange(j0, j1)[:, None]
             boxes = shapely.box(x, y, x + self.cell, y + self.cell)
             shapely.prepare(shape)
-            near = shapely.dwithin(shape, boxes, distance)
+            near = shapely.dwithin(shape, boxes, distance - _HAIR)
             part = state[j0:j1, i0:i1]
             part[near & (part == FREE)] = kind
         return replace(self, state=state)
