@@ -7,6 +7,7 @@ Every one of them is a `StanielError`; the command line prints its message and e
 __all__ = [
     "CityError",
     "OutputError",
+    "PlanningError",
     "RecordError",
     "ScenarioError",
     "StanielError",
@@ -32,6 +33,10 @@ class RecordError(StanielError):
 
 class OutputError(StanielError):
     """Results cannot be written where they were asked for."""
+
+
+class PlanningError(StanielError):
+    """A path cannot be planned for what was asked: a goal in a building, a radius of 0."""
 
 
 class StudyError(StanielError):
