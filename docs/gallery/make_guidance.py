@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
+from staniel.world.aircraft import encode, limits
 
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.command import Command, FlyLine, FlyOrbit
@@ -30,7 +31,6 @@ from staniel.guidance import (
 )
 from staniel.kernels.flight import fly
 from staniel.pictures import style
-from staniel.world.aircraft import encode, limits
 
 HERE = Path(__file__).resolve().parent
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from staniel.kernels.cells import SAGITTA, Cells, advanced, line_cost, piece_cost
-from staniel.kernels.dubins import shortest
+from staniel.kernels.dubins import shortest_length
 from staniel.kernels.field import cost_to
 from staniel.kernels.heap import pop, push
 from staniel.kernels.shots import TURNS, shot, to_place
@@ -32,12 +32,14 @@ def flown(x, y, course, word, parts, radius):
 @example(0.0, 1.0, 0.0)
 @example(0.0, 0.5, 0.0)
 def test_to_place_is_the_best_over_all_courses(x, y, course):
+    # A place that is all but reached costs nothing or a whole circle: rounding may decide.
+    assume(math.hypot(x, y) > 1e-9 or x == y == 0.0)
     length, word, *parts = to_place(1.0, 2.0, course, 1.0 + x, 2.0 + y, 1.0)
     end = flown(1.0, 2.0, course, word, parts, 1.0)
     assert math.hypot(end[0] - 1.0 - x, end[1] - 2.0 - y) < 1e-6
     courses = np.append(np.linspace(-math.pi, math.pi, 721), course)
     for step in (0.01, 1e-4):
-        tried = [shortest(1.0, 2.0, course, 1.0 + x, 2.0 + y, c, 1.0)[0] for c in courses]
+        tried = [shortest_length(1.0, 2.0, course, 1.0 + x, 2.0 + y, c, 1.0) for c in courses]
         best = courses[int(np.argmin(tried))]
         courses = np.append(np.linspace(best - step, best + step, 201), best)
     assert min(tried) - 1e-4 <= length <= min(tried) + 1e-6

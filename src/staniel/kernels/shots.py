@@ -80,7 +80,7 @@ def to_place(
     Returns
     -------
     length, word, first, middle, last
-        As of `staniel.kernels.dubins.shortest`, with 0 for the last.
+        Length of the path [m], its word, and its pieces in radii, of which the last is 0.
 
     Notes
     -----
@@ -139,7 +139,12 @@ def shot(
     turned = _on_circle(x0, y0, course0, x1, y1, course1, radius)
     if turned != 0.0:
         return radius * abs(turned), LSL if turned > 0.0 else RSR, abs(turned), 0.0, 0.0
-    return shortest(x0, y0, course0, x1, y1, course1, radius)
+    start, goal = np.empty((1, 3)), np.empty((1, 3))
+    start[0, 0], start[0, 1], start[0, 2] = x0, y0, course0
+    goal[0, 0], goal[0, 1], goal[0, 2] = x1, y1, course1
+    lengths, words, pieces = shortest(start, goal, radius)
+    first, middle, last = pieces[0] / radius
+    return lengths[0], words[0], first, middle, last
 
 
 @njit(cache=True, error_model="numpy")
