@@ -2,8 +2,8 @@
 
 Run as ``python benchmarks/planning.py``. One thread, compile excluded. The cities are the maps and
 footprints of ``../shared/data`` (1 km² each), or where these are missing a generated one. Starts
-and goals are random poses in free cells of 4 m; most have a course that is hard to come from or to end
-in, and not all can be reached: success counts among the questions that any planner answered.
+and goals are random poses in free cells of 4 m; most have a course that is hard to come from or to
+end in, and not all can be reached: success counts among the questions that any planner answered.
 """
 
 import argparse
