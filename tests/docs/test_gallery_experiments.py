@@ -1,0 +1,47 @@
+"""The page of the experiments shows its pictures, and has words for every packaged experiment."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from staniel.studies import load_study
+
+GALLERY = Path(__file__).resolve().parents[2] / "docs" / "gallery"
+
+
+@pytest.fixture(scope="module")
+def script():
+    spec = importlib.util.spec_from_file_location("experiments", GALLERY / "make_experiments.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_picture_is_there():
+    page = (GALLERY / "experiments.md").read_text(encoding="utf-8")
+    shown = re.findall(r"\]\(([\w.-]+\.png)\)", page)
+    assert set(shown) == {path.name for path in GALLERY.glob("experiment_*.png")}
+    for name in shown:
+        assert (GALLERY / name).stat().st_size < 150_000
+        with Image.open(GALLERY / name) as picture:
+            assert np.ptp(np.asarray(picture.convert("L"))) > 100
+
+
+@pytest.mark.parametrize("number", range(1, 7))
+def test_there_are_words_for_every_claim(script, number):
+    study = load_study(str(number))
+    verdicts, words = script.WORDS[study.name]
+    assert len(verdicts) == len(study.claims)
+    assert len(words.split()) > 30
+
+
+def test_words_about_other_verdicts_stop_the_script(script, monkeypatch):
+    about = {"claims": [{"answer": "open"}] * 3, "points": []}
+    monkeypatch.setattr(script, "summary", lambda results: about)
+    results = type("Made", (), {"study": load_study("1")})()
+    with pytest.raises(SystemExit, match="the words are about"):
+        script.section(results)
