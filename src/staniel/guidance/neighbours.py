@@ -27,7 +27,7 @@ _STEP, _HORIZON = 0.25, 20.0  # of the times for which places are expected [s]
 _BUFFER = 4.0  # beside the separation: what a decision step and an autopilot leave open [m]
 _TURNING = 0.35  # of the sharpest turn: what another may do that nobody expects
 _MOST = 18.0  # ... and how far that takes it before it, too, gives way [m]
-_ASTRAY = 2.5  # how much less is known of a place with each second of silence [m/s]
+_ASTRAY = 8.0  # how much less is known of a place with each second of silence [m/s]
 _HEARD = 1.5  # a word that is not older is news [s]
 _CLIMB = 0.5, 3.0  # what is not known of its height grows by [m/s], up to [m]
 _GIVES_WAY = 5.0  # how near in time one that has to give way is reckoned with [s]
@@ -54,7 +54,8 @@ class Neighbours:
     ----------
     own : int
         Who knows them. Of two aircraft the one with the higher number gives way: it looks far
-        ahead for the other, which reckons with it only when it comes near. Both do so in the end.
+        ahead for the other, which reckons with it only when it comes near, or falls silent. Both
+        do so in the end.
     airframe : Airframe
         The others are taken to fly alike.
     config : GuidanceConfig
@@ -133,7 +134,8 @@ class Neighbours:
             if math.hypot(heard.pose.x - pose.x, heard.pose.y - pose.y) > reach:
                 continue
             now = round(silent / _STEP)
-            keep = self._apart(silent, ahead, who > self._own)
+            gives_way = who > self._own and silent <= _HEARD
+            keep = self._apart(silent, ahead, gives_way)
             for way in (heard.flown, heard.straight):
                 places.append(way[now : now + len(ahead)])
                 apart.append(keep)

@@ -125,6 +125,26 @@ def _banned(bans: Bans, x: float, y: float, z: float) -> int:
 
 
 @njit(cache=True, error_model="numpy")
+def badness(harm: Floats) -> float:
+    """One number for what is wrong: walls and real nearness of others first, then bans.
+
+    Of the distance to keep from others more than half is for what nobody expects of them.
+
+    Parameters
+    ----------
+    harm : (3,) float array
+        As in `Choice`.
+
+    Returns
+    -------
+    float
+    """
+    near = harm[_NEAR]
+    total: float = 1e4 * harm[_WALL] + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
 def _fly_out(
     state: Floats,
     climb: float,
@@ -141,16 +161,19 @@ def _fly_out(
     bans: Bans,
     tolerated: int,
     harm: Floats,
+    enough: float,
 ) -> tuple[float, float]:
     """Fly a command, `state` in place, and add to `harm` what is wrong on the way.
 
-    Bans of a `tolerated` level do not count.
+    Bans of a `tolerated` level do not count. It stops where that is as bad as `enough`.
 
     Returns the climb rate and when the way first meets something, infinite where it does not. What
     comes early weighs more: there is less time to think again.
     """
     first = np.inf
     for k in range(steps):
+        if first < np.inf and badness(harm) >= enough:
+            break
         climb = fly_step(state, climb, command, limits, wind[0], wind[1], k * dt, dt)
         time = start + (k + 1) * dt
         x, y, z = state[0], state[1], state[2]
@@ -169,26 +192,6 @@ def _fly_out(
         if wrong and first == np.inf:
             first = time
     return climb, first
-
-
-@njit(cache=True, error_model="numpy")
-def badness(harm: Floats) -> float:
-    """One number for what is wrong: walls and real nearness of others first, then bans.
-
-    Of the distance to keep from others more than half is for what nobody expects of them.
-
-    Parameters
-    ----------
-    harm : (3,) float array
-        As in `Choice`.
-
-    Returns
-    -------
-    float
-    """
-    near = harm[_NEAR]
-    total: float = 1e4 * harm[_WALL] + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
-    return total
 
 
 @njit(cache=True, error_model="numpy")
@@ -274,24 +277,10 @@ def ways(
         for k in range(1 + steps):
             dt = rules.dt if k == 0 else rules.stride
             count = rules.substeps if k == 0 else 1
-            row = commands[c]
             rate, first = _fly_out(
-                own,
-                rate,
-                row,
-                limits,
-                wind,
-                time,
-                dt,
-                count,
-                tops,
-                False,
-                others,
-                1e9,
-                bans,
-                0,
-                harm,
-            )
+                own, rate, commands[c], limits, wind, time, dt, count, tops, False, others, np.inf,
+                bans, 0, harm, np.inf,
+            )  # fmt: skip
             time += count * dt
             if first < np.inf and clear[c] >= rules.foresight:
                 clear[c] = first
@@ -341,8 +330,10 @@ def choose(
         there, first_harm = state.copy(), np.zeros(3)
         rate, _ = _fly_out(
             there, climb, commands[c], limits, wind, 0.0, rules.dt, rules.substeps,
-            tops, True, others, rules.apart_for, bans, within, first_harm,
+            tops, True, others, rules.apart_for, bans, within, first_harm, least,
         )  # fmt: skip
+        if badness(first_harm) >= least:
+            continue
         circles, seconds = _escapes(there, commands[c], limits, wind, speed)
         for e in range(circles.shape[0]):
             if seconds[e] == 0.0:
@@ -351,7 +342,7 @@ def choose(
             _fly_out(
                 own, rate, circles[e], limits, wind, rules.dt * rules.substeps, rules.stride,
                 int(seconds[e] / rules.stride), tops, True, others, rules.apart_for, bans, within,
-                harm,
+                harm, least,
             )  # fmt: skip
             total = badness(harm)
             if total < least:

@@ -165,9 +165,9 @@ def _grow(source: Singles, target: Singles, radius: float) -> None:
                 continue
             j0, j1 = max(0, -dj), min(n, n - dj)
             for i in range(max(0, -di), min(n, n - di)):
-                row, other = target[i], source[i + di]
-                for j in range(j0, j1):
-                    row[j] = max(row[j], other[j + dj])
+                row, other = target[i, j0:j1], source[i + di, j0 + dj : j1 + dj]
+                for j in range(row.size):
+                    row[j] = row[j] if row[j] >= other[j] else other[j]
 
 
 @njit(cache=True, error_model="numpy")
