@@ -94,7 +94,7 @@ def behind(speed: float, gap: float, brake: float, dt: float) -> float:
 def sight(speed: float, habits: Array, dt: float) -> float:
     """How far away somebody can be that a driver must slow down for [m]."""
     fast = speed + habits[3] * dt
-    return 4.0 * habits[0] + 2.0 * GAP + 0.5 * fast * fast / habits[3] + fast * dt
+    return float(4.0 * habits[0] + 2.0 * GAP + 0.5 * fast * fast / habits[3] + fast * dt)
 
 
 @njit(cache=True, error_model="numpy")

@@ -5,7 +5,7 @@ them contest each other where two vehicles could not stand on both, unless one l
 at once.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,8 @@ def with_stretches(roads: Roads, legs: Legs, before: Ints, after: Ints, radius: 
     contested = np.zeros(len(arc), dtype=np.bool_)
     contested[pairs.ravel()] = True
     _spread(contested, links, np.concatenate(aside))
-    return roads._replace(**_stretches(contested, pairs, first))
+    stretches: dict[str, Any] = _stretches(contested, pairs, first)
+    return roads._replace(**stretches)
 
 
 def _cell(short: Floats, count: Ints) -> Ints:
@@ -161,7 +162,8 @@ def _meetings(ways: _Places, cells: Ints, n: int, radius: float) -> "csr_array":
     pairs = cells[pairs[ways.arcs[pairs[:, 0]] != ways.arcs[pairs[:, 1]]]]
     one = np.ones(len(pairs), dtype=np.bool_)
     meet = sparse.csr_array((one, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    return meet + meet.T
+    both: sparse.csr_array = meet + meet.T
+    return both
 
 
 def _leading(links: Ints, n: int, radius: float) -> "csr_array":
