@@ -153,14 +153,16 @@ def test_each_vehicle_has_its_own_speed_and_draws():
 def test_arcs_lead_back_and_slow_down_in_time():
     nodes = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]])
     network = RoadNetwork(nodes, np.array([[0, 1], [1, 2]]), np.array([True, True]))
-    roads = arcs_of(network, Traffic(max_acceleration=2.0))
+    traffic = Traffic(max_acceleration=2.0, lane_offset=0.0)
+    roads = arcs_of(network, traffic, City.open((200.0, 200.0)).walls)
     forth = roads.arcs[:, 2]
     np.testing.assert_array_equal(roads.arcs[forth, 0], roads.arcs[:, 1])
     np.testing.assert_array_equal(forth[forth], np.arange(4))
     # Before a dead end one must be able to stop; before a right angle, to take its fillet.
-    dead_end = np.sqrt(2 * 2.0 * 50.0)
+    # The fillet takes 3 m of each leg.
+    dead_end = np.sqrt(2 * 2.0 * 47.0)
     assert roads.entry[1] == pytest.approx(dead_end)
-    assert roads.entry[0] == pytest.approx(np.sqrt((np.pi / 3 * 3.0) ** 2 + 2 * 2.0 * 100.0))
+    assert roads.entry[0] == pytest.approx(np.sqrt((np.pi / 3 * 3.0) ** 2 + 2 * 2.0 * 94.0))
 
 
 def test_followers_of_real_streets_stay_free():

@@ -22,6 +22,8 @@ Bools = NDArray[np.bool_]
 
 _MERGE = 0.5  # vertices nearer than this are one junction [m]
 _TOUCHING = 1e-6  # a road may have so much of itself in common with a building [m]
+_OPPOSITE = -0.9  # cosine of the angle between two directions that are opposite
+_SIDE_BY_SIDE = 15.0  # roads that run so far beside one another do so on purpose [m]
 _MOST_VERTICES = 1_000_000
 _LINES = ("LineString", "MultiLineString")
 _FALSE = frozenset({"no", "false", "0", "none", ""})
@@ -152,6 +154,82 @@ class RoadNetwork:
             near = near[shapely.length(common) > _TOUCHING]
         clear[near] = False
         return self._part(clear)._connected()
+
+    def without_head_on(self, offset: float, width: float) -> "RoadNetwork":
+        """The directions that can be driven at once where roads run side by side.
+
+        Two roads that lie nearer together than their lanes need are the two halves of one: on each
+        only the direction stays that has the other half to its left.
+
+        Parameters
+        ----------
+        offset : float [m]
+            At which one drives to the right of a road's middle, at least 0.
+        width : float [m]
+            Nearer than that two lanes lie on one another.
+
+        Returns
+        -------
+        RoadNetwork
+            Without the directions of which more than half, and more than 15 m, lies on a lane that
+            leads the opposite way, reduced as by `clear_of`.
+        """
+        back = np.flatnonzero(self.both_ways)
+        ways = np.concatenate([self.edges, self.edges[back, ::-1]])
+        road = np.concatenate([np.arange(len(self.edges)), back])
+        starts, ends = self.nodes[ways[:, 0]], self.nodes[ways[:, 1]]
+        along = (ends - starts) / self.lengths[road, None]
+        right = offset * np.stack([along[:, 1], -along[:, 0]], axis=1)
+        lanes = np.asarray(shapely.linestrings(np.stack([starts + right, ends + right], axis=1)))
+        a, b = shapely.STRtree(lanes).query(lanes, predicate="dwithin", distance=width)
+        against = (road[a] != road[b]) & ((along[a] * along[b]).sum(axis=1) < _OPPOSITE)
+        a, b = a[against], b[against]
+        common = shapely.intersection(lanes[a], shapely.buffer(lanes[b], width, cap_style="flat"))
+        shared = np.bincount(a, weights=shapely.length(common), minlength=len(ways))
+        free = (shared < _SIDE_BY_SIDE) | (shared < 0.5 * self.lengths[road])
+        forth, other = free[: len(self.edges)], np.zeros(len(self.edges), dtype=np.bool_)
+        other[back] = free[len(self.edges) :]
+        edges = np.where(forth[:, None], self.edges, self.edges[:, ::-1])
+        return RoadNetwork(self.nodes, edges, forth & other)._part(forth | other)._connected()
+
+    def without_stubs(self, length: float, apart: float) -> "RoadNetwork":
+        """Without dead ends in which one would turn round in a junction or on another road.
+
+        Parameters
+        ----------
+        length : float [m]
+            At least so far from the end of a dead end to the first junction.
+        apart : float [m]
+            At least so far from there to any other road.
+
+        Returns
+        -------
+        RoadNetwork
+            Where what one dead end leaves is another, without that, too.
+        """
+        pieces = np.asarray(shapely.linestrings(self.nodes[self.edges]))
+        tree, lengths = shapely.STRtree(pieces), self.lengths
+        keep = np.ones(len(self.edges), dtype=np.bool_)
+        at: list[list[int]] = [[] for _ in self.nodes]
+        for edge, (a, b) in enumerate(self.edges.tolist()):
+            at[a].append(edge)
+            at[b].append(edge)
+        tips = [node for node, edges in enumerate(at) if len(edges) == 1]
+        while tips:
+            tip = node = tips.pop()
+            stub = list[int]()
+            while len(onward := [edge for edge in at[node] if edge not in stub[-1:]]) == 1:
+                stub += onward
+                node = int(self.edges[onward[0]].sum()) - node
+                if len(at[node]) > 2:
+                    break
+            if len(at[node]) < 3:
+                continue  # a road without a junction
+            near = tree.query(shapely.points(self.nodes[tip]), predicate="dwithin", distance=apart)
+            if lengths[stub].sum() < length or (keep[near] & ~np.isin(near, stub)).any():
+                keep[stub] = False
+                at[node].remove(stub[-1])
+        return self._part(keep)
 
     def _connected(self) -> "RoadNetwork":
         """The strongly connected part of greatest length."""

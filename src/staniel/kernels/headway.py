@@ -1,4 +1,4 @@
-"""How fast a driver on a road may go: by corners, by junctions, by who is ahead.
+"""How fast a driver on a road may go: by corners, and by who is ahead.
 
 Columns, corners and legs are those of `staniel.kernels.routes`.
 """
@@ -10,39 +10,50 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.routes import (
-    ARC,
-    CLAIM,
+    AHEAD,
     CURVE,
     CUT,
-    DETOUR,
     FILLET,
-    NEAR,
+    LEFT,
     NEXT,
     NX,
     NY,
+    OVER,
     PHASE,
+    ROUTE,
     SLIGHT,
     TURN,
     TX,
     TY,
     Roads,
+    corner_ahead,
+    left_on,
+    way_left,
 )
 
 __all__ = [
+    "ASIDE",
     "FARTHEST",
+    "GAP",
+    "anybody_within",
+    "behind",
     "follow_speed",
     "in_the_way",
-    "junction_size",
-    "junction_speed",
+    "queue_speed",
     "road_speed",
+    "sight",
 ]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_GAP = 0.5  # kept to the vehicle ahead at rest [m]
-_ASIDE = 0.3  # who is farther aside than two radii and that is not in the way [m]
-FARTHEST = 60.0  # no driver looks farther ahead [m]
+GAP = 0.5
+"""Kept to the vehicle ahead at rest [m]."""
+ASIDE = 0.1
+"""Who is farther aside than two radii and that is not in the way [m]."""
+_NEARER = 0.05  # who comes no nearer than that, passes [m]
+FARTHEST = 60.0
+"""No driver looks farther ahead [m]."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -55,22 +66,47 @@ def in_the_way(
     uy: float,
     length: float,
     r: float,
+    apart: float,
 ) -> float:
-    """How far along a leg the other vehicle is [m], negative where it is not in the way."""
+    """How far along a leg the other vehicle is [m], negative where it is not in the way.
+
+    Who is `apart` metres from the driver now, and would hardly be nearer, is not.
+    """
     dx, dy = vehicles[other, 0] - x, vehicles[other, 1] - y
-    along, aside = dx * ux + dy * uy, abs(dx * uy - dy * ux)
-    if aside > 2.0 * r + _ASIDE or along <= 0.0 or along > length + 2.0 * r:
+    along, aside = dx * ux + dy * uy, dx * uy - dy * ux
+    beyond = max(along - length, 0.0)
+    reach = min(2.0 * r + ASIDE, max(apart - _NEARER, 2.0 * r))
+    if along <= 0.0 or aside * aside + beyond * beyond > reach * reach:
         return -1.0
     return float(along)
 
 
 @njit(cache=True, error_model="numpy")
-def _behind(speed: float, gap: float, brake: float, dt: float) -> float:
+def behind(speed: float, gap: float, brake: float, dt: float) -> float:
     """Greatest speed from which one can slow down to `speed` within `gap`, in steps of `dt`."""
     if gap <= 0.0:
         return speed
     step = brake * dt
     return max(math.sqrt(step * step + speed * speed + 2.0 * brake * gap) - step, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def sight(speed: float, habits: Array, dt: float) -> float:
+    """How far away somebody can be that a driver must slow down for [m]."""
+    fast = speed + habits[3] * dt
+    return float(4.0 * habits[0] + 2.0 * GAP + 0.5 * fast * fast / habits[3] + fast * dt)
+
+
+@njit(cache=True, error_model="numpy")
+def anybody_within(
+    vehicles: Array, near: Indices, begin: int, end: int, i: int, reach: float
+) -> bool:
+    """Whether a neighbour is nearer than `reach`."""
+    for k in range(begin, end):
+        dx, dy = vehicles[near[k], 0] - vehicles[i, 0], vehicles[near[k], 1] - vehicles[i, 1]
+        if dx * dx + dy * dy < reach * reach:
+            return True
+    return False
 
 
 @njit(cache=True, error_model="numpy")
@@ -90,75 +126,75 @@ def follow_speed(
     wx, wy = memory[i, NX] - memory[i, TX], memory[i, NY] - memory[i, TY]
     second = math.hypot(wx, wy)
     wx, wy = (wx / second, wy / second) if second > 0.0 else (0.0, 0.0)
-    cut = memory[i, CUT] if memory[i, PHASE] == FILLET else 0.0
-    tx, ty = memory[i, TX] + cut * wx, memory[i, TY] + cut * wy
+    tx, ty = memory[i, TX], memory[i, TY]
+    if memory[i, PHASE] == FILLET:
+        # As if one went on straight and turned where the second leg is met.
+        ahead = memory[i, CURVE] * math.tan(0.5 * memory[i, LEFT])
+        tx = x + ahead * math.cos(vehicles[i, 2])
+        ty = y + ahead * math.sin(vehicles[i, 2])
+        second = math.hypot(memory[i, NX] - tx, memory[i, NY] - ty)
     ux, uy = tx - x, ty - y
     leg = math.hypot(ux, uy)
     ux, uy = (ux / leg, uy / leg) if leg > 0.0 else (wx, wy)
-    most = math.inf
+    most, far = math.inf, sight(vehicles[i, 3], habits, dt)
     for k in range(begin, end):
         j = near[k]
         speed, heading = vehicles[j, 3], vehicles[j, 2]
-        along = in_the_way(vehicles, j, x, y, ux, uy, leg, r)
+        apart = math.hypot(vehicles[j, 0] - x, vehicles[j, 1] - y)
+        if apart > far:
+            continue
+        along = in_the_way(vehicles, j, x, y, ux, uy, leg, r, apart)
         ahead = math.cos(heading) * ux + math.sin(heading) * uy
         if along < 0.0:
-            along = in_the_way(vehicles, j, tx, ty, wx, wy, second - cut, r)
+            along = in_the_way(vehicles, j, tx, ty, wx, wy, second, r, apart)
             if along < 0.0:
                 continue
             along += leg
             ahead = math.cos(heading) * wx + math.sin(heading) * wy
-        gap = along - 2.0 * r - _GAP
-        most = min(most, _behind(max(speed * ahead, 0.0), gap, brake, dt))
+        gap = along - 2.0 * r - GAP
+        most = min(most, behind(max(speed * ahead, 0.0), gap, brake, dt))
     return most
 
 
 @njit(cache=True, error_model="numpy")
-def junction_speed(
+def queue_speed(
     roads: Roads,
     vehicles: Array,
     memory: Array,
-    near: Indices,
-    begin: int,
-    end: int,
+    queue: Indices,
+    after: Indices,
     i: int,
     habits: Array,
     dt: float,
 ) -> float:
-    """Greatest speed that stops before the next junction while it is somebody else's [m/s].
+    """Greatest speed that keeps the distance to whoever is ahead on the same arcs [m/s].
 
-    Who comes so near that it would have to brake claims a junction that nobody is on, nobody has
-    claimed and nobody is nearer to on the same arc: so one after the other goes through.
+    However many corners are between: `follow_speed` sees no farther than the next two. For `queue`
+    and `after` see `staniel.kernels.claims`.
     """
-    arc = memory[i, ARC]
-    node = roads.arcs[int(arc), 1]
-    x, y, size = roads.nodes[node, 0], roads.nodes[node, 1], junction_size(habits)
-    own = int(memory[i, CLAIM]) - 1
-    if own >= 0 and own != node:
-        dx, dy = vehicles[i, 0] - roads.nodes[own, 0], vehicles[i, 1] - roads.nodes[own, 1]
-        if dx * dx + dy * dy > size * size:
-            memory[i, CLAIM] = 0.0
-    if own == node or roads.first[node + 1] - roads.first[node] < 3:
-        return math.inf
-    way = math.hypot(vehicles[i, 0] - x, vehicles[i, 1] - y)
-    most = _behind(0.0, way - size - NEAR, habits[3], dt)
-    if way <= size:
-        return math.inf
-    if most > vehicles[i, 3] + habits[3] * dt or way > FARTHEST:
-        return most
-    for k in range(begin, end):
-        j = near[k]
-        apart = math.hypot(vehicles[j, 0] - x, vehicles[j, 1] - y)
-        nearer = memory[j, ARC] == arc and apart < way
-        if nearer or apart < size or memory[j, CLAIM] == node + 1.0:
-            return most
-    memory[i, CLAIM] = node + 1.0
-    return math.inf
-
-
-@njit(cache=True, error_model="numpy")
-def junction_size(habits: Array) -> float:
-    """Distance from a junction's middle at which one waits for who is on it [m]."""
-    return float(habits[1] + 2.0 * habits[0] + 1.0)
+    r, brake = habits[0], habits[3]
+    arcs, ends, corners = roads.arcs, roads.ends, roads.corners
+    left = way_left(ends, memory, i, vehicles[i, 0], vehicles[i, 1])
+    horizon = sight(vehicles[i, 3], habits, dt)
+    n, upto, most = vehicles.shape[0], left, math.inf
+    for k in range(AHEAD):
+        if k > 0:
+            place = corner_ahead(arcs, memory, i, k)
+            if upto - corners[place, 2] > horizon:
+                break
+            upto += corners[place, 3]
+        arc = int(memory[i, ROUTE + k])
+        entry = queue[arc]
+        while entry >= 0:
+            j = entry if entry < n else entry - n
+            entry = after[entry]
+            if j == i:
+                continue
+            along = upto - left_on(ends, memory, j, arc, vehicles[j, 0], vehicles[j, 1])
+            if 0.0 < along < horizon:
+                gap = along - 2.0 * r - GAP
+                most = min(most, behind(vehicles[j, 3], gap, brake, dt))
+    return most
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,16 +207,16 @@ def _corner_speed(memory: Array, i: int, turn_rate: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def road_speed(
-    roads: Roads, memory: Array, i: int, x: float, y: float, habits: Array, dt: float
+    entry: Array, memory: Array, i: int, x: float, y: float, habits: Array, dt: float
 ) -> float:
     """Greatest speed that the corners ahead allow [m/s]."""
-    corner = _corner_speed(memory, i, habits[2])
+    corner, brake = _corner_speed(memory, i, habits[2]), habits[3]
     leg = math.hypot(memory[i, NX] - memory[i, TX], memory[i, NY] - memory[i, TY])
-    beyond = 0.0 if memory[i, DETOUR] != 0.0 else roads.entry[int(memory[i, NEXT])]
+    if memory[i, OVER] != 0.0:
+        beyond = behind(0.0, leg - memory[i, CUT], brake, dt)
+    else:
+        beyond = entry[int(memory[i, NEXT])]
     if memory[i, PHASE] == FILLET:
         return min(corner, beyond)
-    way = math.hypot(memory[i, TX] - x, memory[i, TY] - y)
-    most = _behind(min(corner, beyond), way - memory[i, CUT], habits[3], dt)
-    if memory[i, DETOUR] != 0.0:
-        most = max(most, _behind(0.0, way + leg, habits[3], dt))
-    return min(most, _behind(corner, way - memory[i, CUT], habits[3], dt))
+    way = math.hypot(memory[i, TX] - x, memory[i, TY] - y) - memory[i, CUT]
+    return behind(min(corner, beyond), way, brake, dt)

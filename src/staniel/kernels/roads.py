@@ -9,18 +9,25 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.claims import all_claims, claim_speed
+from staniel.kernels.corners import corners
 from staniel.kernels.headway import (
     FARTHEST,
+    GAP,
+    anybody_within,
     follow_speed,
-    in_the_way,
-    junction_size,
-    junction_speed,
+    queue_speed,
     road_speed,
+    sight,
 )
 from staniel.kernels.neighbours import neighbours, rebuild_every
 from staniel.kernels.random import fold
+from staniel.kernels.reroute import other_way
 from staniel.kernels.routes import (
     ARC,
+    CLAIM,
+    CLAIMS,
+    CROSSING,
     CURVE,
     CUT,
     FILLET,
@@ -30,6 +37,7 @@ from staniel.kernels.routes import (
     NEAR,
     NX,
     NY,
+    OVER,
     PHASE,
     ROTATING,
     SLIGHT,
@@ -42,9 +50,8 @@ from staniel.kernels.routes import (
     Roads,
     draw,
     pass_corner,
-    set_out,
-    settle,
 )
+from staniel.kernels.settle import settle
 from staniel.kernels.traffic import wrapped
 from staniel.kernels.walls import Walls, warm_walls
 
@@ -55,6 +62,18 @@ Indices = NDArray[np.int64]
 
 _CRAWL = 1.0  # speed of who squeezes past [m/s]
 _LEGS = 8  # at most so many legs and fillets in one dynamics step
+
+
+@njit(cache=True, error_model="numpy")
+def _straight_on(pose: Array, memory: Array, i: int, way: float) -> bool:
+    """Move the pose on its leg; False, and nothing done, where that ends before."""
+    ux, uy = memory[i, TX] - pose[0], memory[i, TY] - pose[1]
+    leg = math.hypot(ux, uy)
+    if way >= leg - memory[i, CUT] - NEAR:
+        return False
+    pose[0] += way * ux / leg
+    pose[1] += way * uy / leg
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -74,14 +93,11 @@ def _advance(
             return
         wx, wy = memory[i, NX] - memory[i, TX], memory[i, NY] - memory[i, TY]
         if memory[i, PHASE] == STRAIGHT:
+            if _straight_on(pose, memory, i, way):
+                return
             ux, uy = memory[i, TX] - pose[0], memory[i, TY] - pose[1]
             leg = math.hypot(ux, uy)
-            left = leg - memory[i, CUT]
-            if way < left - NEAR:
-                pose[0] += way * ux / leg
-                pose[1] += way * uy / leg
-                return
-            way -= left
+            way -= leg - memory[i, CUT]
             if memory[i, CUT] > 0.0:
                 pose[0] = memory[i, TX] - memory[i, CUT] * ux / leg
                 pose[1] = memory[i, TY] - memory[i, CUT] * uy / leg
@@ -133,6 +149,8 @@ def _wait(memory: Array, i: int, speed: float, habits: Array, dt: float, key: np
     """Keep the times of stops; whether the driver wants to stand now."""
     if habits[4] <= 0.0:
         return False
+    if memory[i, CLAIM] > 0.0:
+        return False  # others wait for it
     if memory[i, HOLD] > 0.0:
         if speed == 0.0:
             memory[i, HOLD] -= dt
@@ -145,31 +163,14 @@ def _wait(memory: Array, i: int, speed: float, habits: Array, dt: float, key: np
 
 
 @njit(cache=True, error_model="numpy")
-def _room_to_turn(
-    vehicles: Array,
-    trial: Array,
-    near: Indices,
-    begin: int,
-    end: int,
-    x: float,
-    y: float,
-    r: float,
-) -> bool:
-    """Whether nobody is on the first few metres towards T."""
-    ux, uy = trial[0, TX] - x, trial[0, TY] - y
-    leg = math.hypot(ux, uy)
-    for k in range(begin, end):
-        if in_the_way(vehicles, near[k], x, y, ux / leg, uy / leg, 8.0 * r, r) > 0.0:
-            return False
-    return True
-
-
-@njit(cache=True, error_model="numpy")
 def _follow_one(
     walls: Walls,
     roads: Roads,
     vehicles: Array,
     memory: Array,
+    claimed: Indices,
+    queue: Indices,
+    after: Indices,
     near: Indices,
     begin: int,
     end: int,
@@ -180,8 +181,10 @@ def _follow_one(
     dt: float,
     pose: Array,
     trial: Array,
+    ids: Indices,
+    ways: Array,
 ) -> None:
-    """One dynamics step of vehicle i, in place; `pose` and `trial` are scratch."""
+    """One dynamics step of vehicle i, in place; the last four are scratch."""
     if top <= 0.0:
         return  # parked
     r, turn_rate, brake, patience = habits[0], habits[2], habits[3], habits[6]
@@ -195,48 +198,58 @@ def _follow_one(
             vehicles[i, 2] = wrapped(heading + (most if left > 0.0 else -most))
         vehicles[i, 3] = 0.0
         return
-    back, slowly = roads.arcs[int(memory[i, ARC]), 2], 1.0
+    claim = claim_speed(roads, vehicles, memory, claimed, queue, after, i, habits, dt, ids, ways)
     standing = _wait(memory, i, speed, habits, dt, key)
-    wish = 0.0 if standing else min(top, road_speed(roads, memory, i, x, y, habits, dt))
-    if wish > 0.0 and begin < end:
-        others = follow_speed(vehicles, memory, near, begin, end, i, habits, dt)
-        junction = junction_speed(roads, vehicles, memory, near, begin, end, i, habits, dt)
-        if memory[i, STUCK] > patience:
-            others = max(others, _CRAWL)
-            if back < 0:
-                junction = max(junction, _CRAWL)
-        # Who waits before a junction, and could also turn round, is patient.
-        slowly = 0.25 if junction < others else 1.0
-        wish = min(wish, others, junction)
+    wish, others = 0.0, math.inf
+    if not standing:
+        wish = min(top, road_speed(roads.entry, memory, i, x, y, habits, dt), claim)
+        if wish > 0.0 and anybody_within(vehicles, near, begin, end, i, sight(speed, habits, dt)):
+            others = min(
+                queue_speed(roads, vehicles, memory, queue, after, i, habits, dt),
+                follow_speed(vehicles, memory, near, begin, end, i, habits, dt),
+            )
+            if memory[i, STUCK] > patience:
+                others = max(others, _CRAWL)
+            wish = min(wish, others)
     speed = min(max(wish, speed - brake * dt), speed + brake * dt)
     for c in range(3):
         pose[c] = vehicles[i, c]
-    for c in range(MEMORY_WIDTH):
-        trial[0, c] = memory[i, c]
-    _advance(walls, roads, pose, trial, 0, speed * dt, habits, key)
+    plain = memory[i, PHASE] == STRAIGHT and _straight_on(pose, memory, i, speed * dt)
+    if not plain:
+        for c in range(CLAIM):
+            trial[0, c] = memory[i, c]
+        _advance(walls, roads, pose, trial, 0, speed * dt, habits, key)
     if begin == end or _swept_apart(vehicles, near, begin, end, i, pose[0], pose[1], r):
         for c in range(3):
             vehicles[i, c] = pose[c]
         vehicles[i, 3] = speed
-        for c in range(MEMORY_WIDTH):
+        for c in range(0 if plain else CLAIM):
             memory[i, c] = trial[0, c]
     else:
         speed = vehicles[i, 3] = 0.0
     if standing or speed > 0.2 * min(top, _CRAWL):
         memory[i, STUCK] = 0.0
         return
-    memory[i, STUCK] += slowly * dt
+    waits = claim < others
+    # Who waits for a visit is patient.
+    memory[i, STUCK] += 0.25 * dt if waits else dt
     if memory[i, STUCK] > 2.0 * patience:
-        # Nobody gives way: turn round, where that is allowed and free, or try again later.
         memory[i, STUCK] = patience * draw(memory, i, key)
-        if back >= 0:
-            for c in range(MEMORY_WIDTH):
-                trial[0, c] = memory[i, c]
-            if set_out(walls, roads, trial, 0, x, y, back, habits, key) and _room_to_turn(
-                vehicles, trial, near, begin, end, x, y, r
-            ):
-                for c in range(MEMORY_WIDTH):
-                    memory[i, c] = trial[0, c]
+        other_way(
+            walls,
+            roads,
+            vehicles,
+            memory,
+            claimed,
+            near,
+            begin,
+            end,
+            i,
+            waits,
+            habits,
+            key,
+            trial,
+        )
 
 
 @njit(cache=True, error_model="numpy")
@@ -282,20 +295,57 @@ def follow(
     now, kept = vehicles.copy(), memory.copy()
     path = np.empty((substeps, n, 4))
     pose, trial = np.empty(3), np.empty((1, MEMORY_WIDTH))
+    ids, ways = np.empty(CLAIMS, dtype=np.int64), np.empty((CLAIMS, 2))
     fastest = 0.0
     for i in range(n):
         fastest = max(fastest, speeds[i])
     braking = fastest * fastest / (2.0 * habits[3])
-    reach = 4.0 * habits[0] + 2.0 * (junction_size(habits) + min(braking, FARTHEST))
+    reach = 4.0 * habits[0] + GAP + min(braking, FARTHEST)
     every = rebuild_every(reach, fastest, dt, substeps)
     first, near = neighbours(now, reach + 2.0 * fastest * dt * every)
+    claimed = all_claims(kept, len(roads.contested))
+    queue = np.full(roads.arcs.shape[0], -1, dtype=np.int64)
+    after, listed = np.empty(2 * n, dtype=np.int64), np.zeros(2 * n, dtype=np.int64)
     for k in range(substeps):
         if k > 0 and k % every == 0:
             first, near = neighbours(now, reach + 2.0 * fastest * dt * every)
-        for i in range(n):
-            begin, end, top, own = first[i], first[i + 1], speeds[i], fold(key, i)
+        for e in range(2 * n):
+            queue[listed[e]] = -1
+        for e in range(2 * n):
+            i = e if e < n else e - n
+            arc = int(kept[i, ARC])
+            if e >= n:
+                if kept[i, OVER] != CROSSING:
+                    listed[e] = listed[i]
+                    continue
+                # Who crosses over is still in the way of those behind.
+                arc = roads.arcs[arc, 2]
+            listed[e] = arc
+            after[e] = queue[arc]
+            queue[arc] = e
+        for nth in range(n):
+            # Now the first, now the last begins: at junctions nobody always comes first.
+            i = nth if k % 2 == 0 else n - 1 - nth
             _follow_one(
-                walls, roads, now, kept, near, begin, end, i, habits, top, own, dt, pose, trial
+                walls,
+                roads,
+                now,
+                kept,
+                claimed,
+                queue,
+                after,
+                near,
+                first[i],
+                first[i + 1],
+                i,
+                habits,
+                speeds[i],
+                fold(key, i),
+                dt,
+                pose,
+                trial,
+                ids,
+                ways,
             )
         for i in range(n):
             for c in range(4):
@@ -306,9 +356,23 @@ def follow(
 def warm() -> None:
     """Compile, or load from the disk cache, what this module is driven with."""
     walls = warm_walls()
-    index = np.array([[0, 1, 1], [1, 0, 0]])
+    nodes = np.array([[0.5, 0.5], [0.5, 0.9]])
+    arcs, zeros = np.array([[0, 1, 1, 0, 0], [1, 0, 0, 0, 1]]), np.zeros((2, 4))
     first, leaving = np.array([0, 1, 2]), np.array([0, 1])
-    roads = Roads(np.array([[0.5, 0.5], [0.5, 0.9]]), index, first, leaving, np.ones(2))
     habits, key = np.array([0.1, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]), np.uint64(0)
+    corners(walls, nodes, arcs, first, leaving, habits)
+    roads = Roads(
+        nodes=nodes,
+        arcs=arcs,
+        ends=zeros,
+        first=first,
+        leaving=leaving,
+        entry=np.ones(2),
+        corners=zeros,
+        stretch=np.zeros(3, dtype=np.int64),
+        contested=np.zeros((0, 2)),
+        first_rival=np.zeros(1, dtype=np.int64),
+        rivals=np.zeros(0, dtype=np.int64),
+    )
     vehicles, memory = settle(walls, roads, habits, 1, 0.1, 1, key)
     follow(walls, roads, vehicles, memory, habits, np.ones(len(vehicles)), key, 0.1, 1)

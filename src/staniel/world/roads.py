@@ -9,16 +9,24 @@ from staniel.city import City, RoadNetwork
 from staniel.datatypes.clock import Clock
 from staniel.errors import ScenarioError
 from staniel.kernels import roads as kernel
-from staniel.kernels.routes import SHARP, SLIGHT, Roads, settle
+from staniel.kernels.corners import corners
+from staniel.kernels.headway import ASIDE
+from staniel.kernels.routes import Roads
+from staniel.kernels.settle import settle
+from staniel.kernels.walls import Walls
 from staniel.world.config import Traffic
+from staniel.world.contested import with_stretches
+from staniel.world.lanes import entry_speeds, legs_of, may_follow
 from staniel.world.traffic import TRIES, speeds
 
 __all__ = ["RoadFollowers", "arcs_of"]
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 _MARGIN = 0.01  # by which a road's middle is clearer of walls than a vehicle needs [m]
-_ROUNDS = 200  # of the search for entry speeds, which mostly settles in ten
+_BESIDE = 1.0  # between vehicles on two roads that end and pass beside one another [m]
+_STUB = 20.0  # who drove into a shorter dead end would turn round in the junction [m]
 
 
 class RoadFollowers:
@@ -51,6 +59,10 @@ class RoadFollowers:
                 'file of LineStrings; with city.source = "geojson")'
             )
         drivable = network.clear_of(city, traffic.radius + _MARGIN)
+        drivable = drivable.without_head_on(traffic.lane_offset, 2.0 * traffic.radius + ASIDE)
+        drivable = drivable.without_stubs(
+            _STUB, 2.0 * (traffic.lane_offset + traffic.radius) + _BESIDE
+        )
         if len(drivable.edges) == 0:
             raise ScenarioError(
                 f'vehicles.kind = "roads": none of the {len(network.edges)} pieces of road is wide '
@@ -60,18 +72,8 @@ class RoadFollowers:
         self._traffic = traffic
         self._clock = clock
         self._key = key
-        self._habits = np.array(
-            [
-                traffic.radius,
-                traffic.lane_offset,
-                math.radians(traffic.turn_rate_deg),
-                traffic.max_acceleration,
-                traffic.stop_interval,
-                traffic.stop_duration,
-                traffic.patience,
-            ]
-        )
-        self._roads = arcs_of(drivable, traffic)
+        self._habits = habits(traffic)
+        self._roads = arcs_of(drivable, traffic, city.walls)
         self._speeds = speeds(traffic, key)
 
     def begin(self) -> tuple[Floats, Floats]:
@@ -117,63 +119,68 @@ class RoadFollowers:
         )
 
 
-def arcs_of(network: RoadNetwork, traffic: Traffic) -> Roads:
-    """Each piece of road once per direction, and how fast each may be entered.
+def arcs_of(network: RoadNetwork, traffic: Traffic, walls: Walls) -> Roads:
+    """Each piece of road once per direction: where and how fast it is driven, and where alone.
 
     Parameters
     ----------
     network : RoadNetwork
         From every node another can be reached.
     traffic : Traffic
+    walls : Walls
+        Of the city.
 
     Returns
     -------
     Roads
     """
     edges, both = network.edges, network.both_ways
+    nodes = np.ascontiguousarray(network.nodes, dtype=np.float64)
     forth, back = np.arange(len(edges)), len(edges) + np.arange(int(both.sum()))
-    arcs = np.full((len(forth) + len(back), 3), -1, dtype=np.int64)
+    arcs = np.full((len(forth) + len(back), 5), -1, dtype=np.int64)
     arcs[forth, :2], arcs[back, :2] = edges, edges[both][:, ::-1]
     arcs[forth[both], 2], arcs[back, 2] = back, forth[both]
     leaving = np.argsort(arcs[:, 0], kind="stable").astype(np.int64)
-    counts = np.bincount(arcs[:, 0], minlength=len(network.nodes))
+    counts = np.bincount(arcs[:, 0], minlength=len(nodes))
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    nodes = np.ascontiguousarray(network.nodes, dtype=np.float64)
-    return Roads(nodes, arcs, first, leaving, _entry_speeds(nodes, arcs, first, leaving, traffic))
-
-
-def _entry_speeds(
-    nodes: Floats,
-    arcs: NDArray[np.int64],
-    first: NDArray[np.int64],
-    leaving: NDArray[np.int64],
-    traffic: Traffic,
-) -> Floats:
-    """Greatest speed on entering each arc with which every corner after it can be taken.
-
-    The least solution of v² = min over what may follow of min(v_corner, v_next)² + 2 a length.
-    """
+    arcs[leaving, 3] = np.arange(len(arcs)) - np.repeat(first[:-1], counts)
     along = nodes[arcs[:, 1]] - nodes[arcs[:, 0]]
-    length, course = np.hypot(*along.T), np.arctan2(along[:, 1], along[:, 0])
-    before = np.repeat(np.arange(len(arcs)), np.diff(first)[arcs[:, 1]])
-    choices = [leaving[first[node] : first[node + 1]] for node in arcs[:, 1]]
-    after = np.concatenate(choices) if choices else np.zeros(0, dtype=np.int64)
-    # One goes back only where there is no other way.
-    onward = after != arcs[before, 2]
-    onward |= (np.bincount(before[onward], minlength=len(arcs)) == 0)[before]
-    before, after = before[onward], after[onward]
-    turn = np.abs((course[after] - course[before] + math.pi) % (2.0 * math.pi) - math.pi)
-    cut = np.minimum(3.0 * traffic.radius, 0.5 * np.minimum(length[before], length[after]))
-    round_it = math.radians(traffic.turn_rate_deg) * cut / np.tan(0.5 * np.clip(turn, 1e-3, 3.1))
-    in_place = np.where(turn < SLIGHT, np.inf, 0.0)
-    corner = np.where((turn < SHARP) & (cut >= 0.3 * traffic.radius), round_it, in_place)
-    entry = np.full(len(arcs), 40.0)
-    gain = 2.0 * traffic.max_acceleration * length
-    for _ in range(_ROUNDS):
-        end = np.full(len(arcs), np.inf)
-        np.minimum.at(end, before, np.minimum(corner, entry[after]))
-        new = np.minimum(40.0, np.sqrt(end * end + gain))
-        if np.array_equal(new, entry):
-            break
-        entry = new
-    return entry
+    length = np.hypot(along[:, 0], along[:, 1])
+    ends = np.concatenate([nodes[arcs[:, 1]], along / length[:, None]], axis=1)
+    arcs[:, 4], places = corners(walls, nodes, arcs, first, leaving, habits(traffic))
+    # Each corner as its arc sees it, and as the arc does that comes next.
+    last = np.repeat(np.arange(len(arcs)), counts[arcs[:, 1]])
+    then = leaving[np.arange(len(last)) - arcs[last, 4] + first[arcs[last, 1]]]
+    short, far = (((ends[a, :2] - places) * ends[a, 2:]).sum(axis=1) for a in (last, then))
+    before, after = may_follow(arcs, first, leaving)
+    roads = Roads(
+        nodes=nodes,
+        arcs=arcs,
+        ends=ends,
+        first=first,
+        leaving=leaving,
+        entry=np.zeros(len(arcs)),
+        corners=np.column_stack([places, short, far - short]),
+        stretch=np.zeros(len(arcs) + 1, dtype=np.int64),
+        contested=np.zeros((0, 2)),
+        first_rival=np.zeros(1, dtype=np.int64),
+        rivals=np.zeros(0, dtype=np.int64),
+    )
+    legs = legs_of(roads, before, after)
+    roads = roads._replace(entry=entry_speeds(legs, arcs, traffic))
+    return with_stretches(roads, legs, before, after, traffic.radius)
+
+
+def habits(traffic: Traffic) -> Floats:
+    """Row of habits for `staniel.kernels.roads.follow`: see `staniel.kernels.routes`."""
+    return np.array(
+        [
+            traffic.radius,
+            traffic.lane_offset,
+            math.radians(traffic.turn_rate_deg),
+            traffic.max_acceleration,
+            traffic.stop_interval,
+            traffic.stop_duration,
+            traffic.patience,
+        ]
+    )

@@ -78,7 +78,7 @@ def speeds(traffic: Traffic, key: np.uint64) -> NDArray[np.float64]:
     if traffic.speed_range is None:
         return np.full(traffic.count, traffic.speed)
     low, high = traffic.speed_range
-    stream = fold(np.uint64(key), _SPEEDS)
+    stream = np.uint64(fold(np.uint64(key), _SPEEDS))
     draws = [uniform(stream, i) for i in range(traffic.count)]
     return low + (high - low) * np.array(draws, dtype=np.float64)
 
