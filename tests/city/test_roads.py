@@ -137,3 +137,41 @@ def test_clear_of_a_city_is_one_part_that_can_be_driven_for_ever():
     assert pieces(net.clear_of(city, radius=10.0 - 1e-6)) == expected - {((20, 80), (20, 95), True)}
     assert len(net.clear_of(city, radius=10.0 + 1e-6).edges) == 0
     assert net.clear_of(City.open((3.0, 3.0))).nodes.shape == (0, 2)
+
+
+def net_of(nodes, edges, both=None):
+    edges = np.array(edges)
+    ones = np.ones(len(edges), dtype=np.bool_)
+    return RoadNetwork(np.array(nodes, dtype=float), edges, ones if both is None else both)
+
+
+def test_short_dead_ends_and_those_that_end_beside_a_road_are_left_out():
+    square = [[0, 0], [100, 0], [100, 100], [0, 100]]
+    ring = [[0, 1], [1, 2], [2, 3], [3, 0]]
+    # From a corner each: 10 m, twice 15 m, 50 m into the open, and 95 m to beside a road.
+    spurs = [[-10, 0], [100, -15], [100, -30], [150, 100], [95, 50]]
+    edges = [*ring, [0, 4], [1, 5], [5, 6], [2, 7], [3, 8]]
+    left = net_of([*square, *spurs], edges).without_stubs(20.0, 6.0)
+    assert {tuple(node) for node in left.nodes.tolist()} == {
+        (0, 0), (100, 0), (100, 100), (0, 100), (100, -15), (100, -30), (150, 100)
+    }  # fmt: skip
+    # Of two short ones at the end of a long one the second is not short without the first.
+    fork = net_of(
+        [*square, [-80, 0], [-85, 5], [-85, -5]], [*ring, [0, 4], [4, 5], [4, 6]]
+    ).without_stubs(20.0, 6.0)
+    assert len(fork.edges) == 6
+    assert (-80.0, 0.0) in {tuple(node) for node in fork.nodes.tolist()}
+    lonely = net_of([[0, 0], [5, 0]], [[0, 1]])
+    assert len(lonely.without_stubs(20.0, 6.0).edges) == 1
+
+
+def test_of_roads_side_by_side_each_keeps_the_direction_on_its_right():
+    # Two streets 4 m apart, joined at both ends by a bend: lanes 1.5 m to the right lie 1 m apart.
+    nodes = [[0, 0], [100, 0], [110, 2], [100, 4], [0, 4], [-10, 2]]
+    edges = [[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [5, 0]]
+    left = net_of(nodes, edges).without_head_on(1.5, 2.1)
+    assert pieces(left) >= {((0, 0), (100, 0), False), ((100, 4), (0, 4), False)}
+    apart = net_of([[x, 5 * y] for x, y in nodes], edges).without_head_on(1.5, 2.1)
+    assert apart.both_ways.all()
+    short = net_of([[x / 10, y] for x, y in nodes], edges).without_head_on(1.5, 2.1)
+    assert short.both_ways.all()

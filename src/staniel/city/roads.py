@@ -192,33 +192,41 @@ class RoadNetwork:
         edges = np.where(forth[:, None], self.edges, self.edges[:, ::-1])
         return RoadNetwork(self.nodes, edges, forth & other)._part(forth | other)._connected()
 
-    def without_stubs(self, length: float) -> "RoadNetwork":
-        """Without the dead ends that are shorter than `length` [m], and those that this leaves.
+    def without_stubs(self, length: float, apart: float) -> "RoadNetwork":
+        """Without dead ends in which one would turn round in a junction or on another road.
 
         Parameters
         ----------
         length : float [m]
-            From the end of a dead end to the first junction.
+            At least so far from the end of a dead end to the first junction.
+        apart : float [m]
+            At least so far from there to any other road.
 
         Returns
         -------
         RoadNetwork
+            Where what one dead end leaves is another, without that, too.
         """
+        pieces = np.asarray(shapely.linestrings(self.nodes[self.edges]))
+        tree, lengths = shapely.STRtree(pieces), self.lengths
         keep = np.ones(len(self.edges), dtype=np.bool_)
         at: list[list[int]] = [[] for _ in self.nodes]
         for edge, (a, b) in enumerate(self.edges.tolist()):
             at[a].append(edge)
             at[b].append(edge)
-        ends = [node for node, edges in enumerate(at) if len(edges) == 1]
-        while ends:
-            node, way, stub = ends.pop(), 0.0, list[int]()
+        tips = [node for node, edges in enumerate(at) if len(edges) == 1]
+        while tips:
+            tip = node = tips.pop()
+            stub = list[int]()
             while len(onward := [edge for edge in at[node] if edge not in stub[-1:]]) == 1:
                 stub += onward
-                way += float(self.lengths[onward[0]])
                 node = int(self.edges[onward[0]].sum()) - node
                 if len(at[node]) > 2:
                     break
-            if way < length and len(at[node]) > 2:
+            if len(at[node]) < 3:
+                continue  # a road without a junction
+            near = tree.query(shapely.points(self.nodes[tip]), predicate="dwithin", distance=apart)
+            if lengths[stub].sum() < length or (keep[near] & ~np.isin(near, stub)).any():
                 keep[stub] = False
                 at[node].remove(stub[-1])
         return self._part(keep)

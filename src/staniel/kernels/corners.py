@@ -17,6 +17,8 @@ __all__ = ["corners"]
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+_NARROWEST = 0.3  # where lanes meet at a sharp turn: 1 + cos of the turn, below which they do not
+
 
 @njit(cache=True, error_model="numpy")
 def corners(
@@ -52,7 +54,7 @@ def corners(
             w = math.hypot(wx, wy)
             # Where the two lanes' lines meet, but not far from the node.
             sx, sy = uy / u + wy / w, -ux / u - wx / w
-            scale = 1.0 / max(0.5 * (sx * sx + sy * sy), 0.8)
+            scale = 1.0 / max(0.5 * (sx * sx + sy * sy), _NARROWEST)
             for part in (1.0, 0.5):
                 cx, cy = px + part * offset * scale * sx, py + part * offset * scale * sy
                 if leg_clear(walls, x, y, cx, cy, r) and leg_clear(walls, cx, cy, px, py, r):

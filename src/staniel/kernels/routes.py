@@ -165,7 +165,8 @@ def way_left(ends: Array, memory: Array, i: int, x: float, y: float) -> float:
     arc = int(memory[i, ARC])
     if memory[i, PHASE] == FILLET:
         share = 2.0 * memory[i, LEFT] / abs(memory[i, TURN]) - 1.0
-        return float(short_of(ends, arc, memory[i, TX], memory[i, TY]) + share * memory[i, CUT])
+        at_corner = short_of(ends, arc, memory[i, TX], memory[i, TY])
+        return float(at_corner + share * memory[i, CUT])
     return short_of(ends, arc, x, y)
 
 

@@ -5,7 +5,7 @@ them contest each other where two vehicles could not stand on both, unless one l
 at once.
 """
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,8 +82,7 @@ def with_stretches(roads: Roads, legs: Legs, before: Ints, after: Ints, radius: 
     contested = np.zeros(len(arc), dtype=np.bool_)
     contested[pairs.ravel()] = True
     _spread(contested, links, np.concatenate(aside))
-    stretches: dict[str, Any] = _stretches(contested, pairs, first)
-    return roads._replace(**stretches)
+    return _in_stretches(roads, contested, pairs, first)
 
 
 def _cell(short: Floats, count: Ints) -> Ints:
@@ -162,7 +161,7 @@ def _meetings(ways: _Places, cells: Ints, n: int, radius: float) -> "csr_array":
     pairs = cells[pairs[ways.arcs[pairs[:, 0]] != ways.arcs[pairs[:, 1]]]]
     one = np.ones(len(pairs), dtype=np.bool_)
     meet = sparse.csr_array((one, (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    both: sparse.csr_array = meet + meet.T
+    both: csr_array = meet + meet.T
     return both
 
 
@@ -204,8 +203,8 @@ def _spread(contested: Bools, links: Ints, aside: Ints) -> None:
             return
 
 
-def _stretches(contested: Bools, pairs: Ints, first: Ints) -> dict[str, NDArray[np.generic]]:
-    """Runs of contested cells of each arc, those first to which one comes first; and rivals."""
+def _in_stretches(roads: Roads, contested: Bools, pairs: Ints, first: Ints) -> Roads:
+    """With the runs of contested cells of each arc, and the rivals of each run."""
     cells = len(contested)
     arc = np.repeat(np.arange(len(first) - 1), np.diff(first))
     at = np.arange(cells)
@@ -228,12 +227,12 @@ def _stretches(contested: Bools, pairs: Ints, first: Ints) -> dict[str, NDArray[
     run[begins] = np.arange(count)
     run = run[np.maximum.accumulate(np.where(contested & new, at, 0))]
     rivals = np.unique(run[pairs], axis=0)
-    return {
-        "stretch": _bounds(arc[begins], len(first) - 1),
-        "contested": np.stack([top, bottom], axis=1),
-        "first_rival": _bounds(rivals[:, 0], count),
-        "rivals": np.ascontiguousarray(rivals[:, 1]),
-    }
+    return roads._replace(
+        stretch=_bounds(arc[begins], len(first) - 1),
+        contested=np.stack([top, bottom], axis=1),
+        first_rival=_bounds(rivals[:, 0], count),
+        rivals=np.ascontiguousarray(rivals[:, 1]),
+    )
 
 
 def _bounds(owners: Ints, count: int) -> Ints:

@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _MARGIN = 0.01  # by which a road's middle is clearer of walls than a vehicle needs [m]
+_BESIDE = 1.0  # between vehicles on two roads that end and pass beside one another [m]
 _STUB = 20.0  # who drove into a shorter dead end would turn round in the junction [m]
 
 
@@ -59,7 +60,9 @@ class RoadFollowers:
             )
         drivable = network.clear_of(city, traffic.radius + _MARGIN)
         drivable = drivable.without_head_on(traffic.lane_offset, 2.0 * traffic.radius + ASIDE)
-        drivable = drivable.without_stubs(_STUB)
+        drivable = drivable.without_stubs(
+            _STUB, 2.0 * (traffic.lane_offset + traffic.radius) + _BESIDE
+        )
         if len(drivable.edges) == 0:
             raise ScenarioError(
                 f'vehicles.kind = "roads": none of the {len(network.edges)} pieces of road is wide '
