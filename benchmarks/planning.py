@@ -2,8 +2,8 @@
 
 Run as ``python benchmarks/planning.py``. One thread, compile excluded. The cities are the maps and
 footprints of ``../shared/data`` (1 km² each), or where these are missing a generated one. Starts
-and goals are random poses in free cells of 4 m; most have a course that is hard to come from or to
-end in, and not all can be reached: success counts among the questions that any planner answered.
+and goals are random poses in free cells of 4 m, the courses random as well: many cannot be left or
+reached in a turn. Success counts among the questions that any of the planners answered.
 """
 
 import argparse
@@ -108,7 +108,9 @@ def compare(names: list[str], count: int) -> None:
         report(setting, {name: merged(parts) for name, parts in sums.items()})
 
 
-def merged(parts: list[tuple[list[Plan | NoPath], np.ndarray]]) -> tuple[list, np.ndarray]:
+def merged(
+    parts: list[tuple[list[Plan | NoPath], np.ndarray]],
+) -> tuple[list[Plan | NoPath], np.ndarray]:
     """Of all cities together."""
     return [a for answers, _ in parts for a in answers], np.concatenate([t for _, t in parts])
 

@@ -1,5 +1,6 @@
 """Plans: flown exactly, clear of walls by shapely, short, refused or answered in bounds."""
 
+import heapq
 import math
 import warnings
 from pathlib import Path
@@ -16,8 +17,9 @@ from staniel.datatypes.risk import RiskRegion
 from staniel.errors import PlanningError
 from staniel.guidance.dangers import Dangers
 from staniel.guidance.planning import Obstacles, Problem, plan, planner, planner_names
-from staniel.kernels.cells import SAGITTA
+from staniel.kernels.cells import SAGITTA, advanced
 from staniel.kernels.dubins import shortest_length
+from staniel.kernels.shots import TURNS, shot
 
 SHARED = Path(__file__).resolve().parents[2] / "../shared/data"
 CLEARANCE = 4.0
@@ -294,3 +296,63 @@ def test_real_cities_are_flown_through(name, share, radius):
     assert bool(again) == bool(answers[0][1])
     if again:
         assert again.pieces.tobytes() == answers[0][1].pieces.tobytes()
+
+
+def reference(problem, courses=16, step=4.0, fine=1.5):
+    """A slow search without a heuristic, on finer cells, its walls polygons: the least length.
+
+    From every pose it reaches it tries the Dubins path to the goal.
+    """
+    grid, radius = problem.obstacles, problem.turn_radius
+    rows, columns = np.nonzero(grid.blocked)
+    x, y = grid.west + grid.cell * columns, grid.south + grid.cell * rows
+    walls = shapely.union_all(shapely.box(x, y, x + grid.cell, y + grid.cell))
+    shapely.prepare(walls)
+    area = shapely.box(*(np.array([0, 0, *grid.state.shape[::-1]]) * grid.cell))
+    shapely.prepare(area)
+
+    def free(points):
+        line = shapely.LineString(points)
+        return area.contains(line) and not walls.intersects(line)
+
+    def arc(x, y, course, bend, length):
+        ways = np.linspace(0.0, length, 12)
+        return np.array([advanced(x, y, course, bend, s)[:2] for s in ways])
+
+    turn = 2.0 * math.pi / courses
+    queue, done, best = [(0.0, 0, problem.start, 0)], set(), math.inf
+    number = 1
+    while queue:
+        spent, _, pose, k = heapq.heappop(queue)
+        key = (int(pose[0] / fine), int(pose[1] / fine), k)
+        if key in done or spent >= best:
+            continue
+        done.add(key)
+        length, word, *parts = shot(*pose, *problem.goal, radius)
+        if spent + length < best:
+            at, points = pose, []
+            for side, part in zip(TURNS[word], parts, strict=True):
+                points.append(arc(*at, side / radius, part * radius))
+                at = advanced(*at, side / radius, part * radius)
+            if free(np.concatenate(points)):
+                best = spent + length
+        for side in (-1, 0, 1):
+            bend, length = side / radius, radius * turn if side else step
+            if free(arc(*pose, bend, length)):
+                after = advanced(*pose, bend, length)
+                heapq.heappush(queue, (spent + length, number, after, (k + side) % courses))
+                number += 1
+    return best
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_hardly_longer_than_an_exhaustive_search_finds(seed):
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(12.0, 68.0, (3, 2))
+    houses = [shapely.box(x, y, x + 9.0, y + 14.0) for x, y in corners]
+    air = Obstacles.open((80.0, 80.0), altitude=9.0, clearance=1.0)
+    problem = random_problem(air.with_shapes(houses, 1), 8.0, rng)
+    exact, found = reference(problem), plan(problem)
+    assert bool(found) == math.isfinite(exact)
+    if found:
+        assert found.length <= 1.05 * exact

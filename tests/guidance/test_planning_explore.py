@@ -40,10 +40,13 @@ class Sky:
     def fly(self, explorer, pose, most=600):
         """All that is flown, (n, 2), and the outcome."""
         flown = []
+        over = 0
         for tick in range(most):
             leg = explorer.step(pose, self.scan(pose, tick))
-            if leg.outcome in ("arrived", "no path"):
-                return np.concatenate(flown or [np.array([pose[:2]])]), leg.outcome
+            # It goes on flying after the end, and must not meet a wall then, either.
+            over += leg.outcome in ("arrived", "no path")
+            if over > 15:
+                return np.concatenate(flown), leg.outcome
             flown.append(leg.path.poses(0.5)[:, :2])
             assert np.hypot(*(flown[-1][0] - pose[:2])) < 1e-6
             pose = leg.path.end

@@ -1,8 +1,9 @@
 """Into the unknown: a chart that starts blank and grows from lidar scans, and who flies by it.
 
 What is unknown is planned through, but never flown into: a stretch is flown only if all of it, and
-a full circle at its end, has been seen to be free. Otherwise the last such circle is flown on. As
-walls do not move, the aircraft never has to be where it has not looked.
+a full circle at its end, has been seen to be free. The stretch may be long, as through a street in
+which no circle fits. Otherwise the last such circle is flown on. As walls do not move, the aircraft
+never has to be where it has not looked.
 """
 
 import math
@@ -31,6 +32,7 @@ Pose = tuple[float, float, float]
 
 _SIGMAS = 4.0  # by which a return may be off its wall
 _NEWS = 10  # cells seen for the first time that count as something new
+_STRIDES = 20  # that a stretch has at most
 _EXPANSIONS = 60_000  # of one replanning
 
 PATIENCE = 12
@@ -105,7 +107,7 @@ class Leg:
         Of the stride's length.
     outcome : {"flying", "waiting", "arrived", "no path"}
         Underway; on a circle, looking; at the goal; or given up. The last two hold until the end,
-        and the aircraft circles.
+        and the aircraft circles, at the end of the stretch that it is on.
     """
 
     path: Plan
@@ -158,7 +160,7 @@ class Explorer:
         self._tolerance, self._stride, self._planner = tolerance, stride, planner
         self._escape = home
         self._plan: Plan | None = None
-        self._flown = 0.0  # of the plan
+        self._flown = self._sure = 0.0  # of the plan, and how far it is seen to be free
         self._idle = 0.0  # flown since something new was seen
         self._refused: Bools = np.zeros_like(chart.known)
         self._waited = 0.0
@@ -188,16 +190,21 @@ class Explorer:
                 self._idle = 0.0
         if self._over is None and math.dist(pose[:2], self._goal) <= self._tolerance:
             self._over = "arrived"
-        if self._over is not None:
-            return Leg(self._circle(pose, self._stride), self._over)
+        if self._flown >= self._sure and self._over is None:
+            self._look_ahead(pose)
+        if self._plan is not None and self._flown < self._sure:
+            start, self._flown = self._flown, min(self._flown + self._stride, self._sure)
+            return Leg(_cut(self._plan, start, self._flown), self._over or "flying")
+        return Leg(self._circle(pose, self._stride), self._over or "waiting")
+
+    def _look_ahead(self, pose: Pose) -> None:
+        """Find the next stretch to fly, and plan anew where that is needed; or else wait."""
         if self._plan is None or not self._is_free(self._plan):
             answer = self._replan(pose)
-            self._plan, self._flown = (answer, 0.0) if isinstance(answer, Plan) else (None, 0.0)
-        leg = self._safe_leg()
-        if leg is not None:
-            return Leg(leg, "flying")
-        self._wait()
-        return Leg(self._circle(pose, self._stride), self._over or "waiting")
+            self._plan = answer if isinstance(answer, Plan) else None
+            self._flown = self._sure = 0.0
+        if self._plan is None or not self._make_sure(self._plan):
+            self._wait()
 
     def _is_free(self, path: Plan) -> bool:
         """Whether what is left of the plan is not known to be blocked."""
@@ -228,21 +235,23 @@ class Explorer:
         found = dubins_along(problem, taut(problem, way), self._way.work)
         return found if found else plan(problem, "astar")
 
-    def _safe_leg(self) -> Plan | None:
-        """The next stride of the plan, where it and a circle at its end are seen to be free."""
-        if self._plan is None:
-            return None
-        until = min(self._flown + self._stride, self._plan.length)
-        leg = _cut(self._plan, self._flown, until)
+    def _make_sure(self, path: Plan) -> bool:
+        """Find the shortest stretch of the plan that, with a circle at its end, is seen free."""
         seen = self.chart.seen_free()
-        if math.isinf(path_cost(seen, np.array(leg.start), leg.pieces)):
-            return None
-        for side in (self._escape, -self._escape):
-            circle = np.array([[side / self._radius, 2.0 * math.pi * self._radius]])
-            if math.isfinite(path_cost(seen, np.array(leg.end), circle)):
-                self._escape, self._flown = side, until
-                return leg
-        return None
+        until = self._flown
+        for _ in range(_STRIDES):
+            leg = _cut(path, until, min(until + self._stride, path.length))
+            until += leg.length
+            if math.isinf(path_cost(seen, np.array(leg.start), leg.pieces)):
+                return False
+            for side in (self._escape, -self._escape):
+                circle = np.array([[side / self._radius, 2.0 * math.pi * self._radius]])
+                if math.isfinite(path_cost(seen, np.array(leg.end), circle)):
+                    self._escape, self._sure = side, until
+                    return True
+            if until >= path.length:
+                return False
+        return False
 
     def _wait(self) -> None:
         """One stride more on the circle; where nothing new is seen, another way or the end."""
@@ -259,7 +268,7 @@ class Explorer:
                 end = self._plan.at(np.array([self._flown + self._stride]))[:, :2]
                 grid = self.chart.obstacles
                 block(self._refused, grid.west, grid.south, grid.cell, end, 0.5 * self._stride)
-        self._plan = None  # it does not begin where the circle leads to
+        self._plan, self._flown, self._sure = None, 0.0, 0.0  # it begins where the circle does not
 
     def _circle(self, pose: Pose, length: float) -> Plan:
         pieces = np.array([[self._escape / self._radius, length]])
