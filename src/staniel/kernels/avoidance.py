@@ -174,8 +174,9 @@ def _fly_out(
     for k in range(steps):
         if first < np.inf and badness(harm) >= enough:
             break
-        climb = fly_step(state, climb, command, limits, wind[0], wind[1], k * dt, dt)
-        time = start + (k + 1) * dt
+        elapsed = start + k * dt
+        climb = fly_step(state, climb, command, limits, wind[0], wind[1], elapsed, dt)
+        time = elapsed + dt
         x, y, z = state[0], state[1], state[2]
         wrong = False
         if _blocked(tops, closed, x, y, z):

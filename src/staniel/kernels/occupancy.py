@@ -30,7 +30,7 @@ class Window(NamedTuple):
     """The cells, n by n; rows are east."""
 
     passed: Singles
-    """Lowest height at which a beam passed [m], infinite where none did."""
+    """Lowest height at which a beam passed above all walls met [m], infinite where none did."""
     met: Singles
     """Greatest height at which a beam met a wall [m], minus infinity where none did."""
     roof: Singles
@@ -135,23 +135,28 @@ def mark(
     """
     n = window.passed.shape[0]
     low = np.float32(height)
-    for b in range(ranges.shape[0]):
-        cos, sin = math.cos(directions[b]), math.sin(directions[b])
-        way = min(ranges[b] - 3.0 * sigma, reach)
+    for k in range(ranges.shape[0]):
+        cos, sin = math.cos(directions[k]), math.sin(directions[k])
+        way = min(ranges[k] - 3.0 * sigma, reach)
         steps = int(2.0 * way / cell) + 1 if way > 0.0 else 0
-        for k in range(steps):
-            along = min(0.5 * k * cell, way)
-            i = math.floor((origins[b, 0] + along * cos) / cell)
-            j = math.floor((origins[b, 1] + along * sin) / cell)
+        for step in range(steps):
+            along = min(0.5 * step * cell, way)
+            i = math.floor((origins[k, 0] + along * cos) / cell)
+            j = math.floor((origins[k, 1] + along * sin) / cell)
             if not (0 <= i - corner[0] < n and 0 <= j - corner[1] < n):
                 break
-            window.passed[i % n, j % n] = min(window.passed[i % n, j % n], low)
-    for b in range(ranges.shape[0]):
-        if math.isfinite(ranges[b]):
-            i = math.floor((origins[b, 0] + ranges[b] * math.cos(directions[b])) / cell)
-            j = math.floor((origins[b, 1] + ranges[b] * math.sin(directions[b])) / cell)
+            a, b = i % n, j % n
+            if low > window.met[a, b] + _TOUCHING:
+                window.passed[a, b] = min(window.passed[a, b], low)
+    for k in range(ranges.shape[0]):
+        if math.isfinite(ranges[k]):
+            i = math.floor((origins[k, 0] + ranges[k] * math.cos(directions[k])) / cell)
+            j = math.floor((origins[k, 1] + ranges[k] * math.sin(directions[k])) / cell)
             if 0 <= i - corner[0] < n and 0 <= j - corner[1] < n:
-                window.met[i % n, j % n] = max(window.met[i % n, j % n], low)
+                a, b = i % n, j % n
+                window.met[a, b] = max(window.met[a, b], low)
+                if window.passed[a, b] <= window.met[a, b] + _TOUCHING:
+                    window.passed[a, b] = np.inf  # it passed in another part of the cell
 
 
 @njit(cache=True, error_model="numpy")
@@ -211,7 +216,7 @@ def tops(
             a, b = (i + corner[0]) % n, (j + corner[1]) % n
             passed, met, top = window.passed[a, b], window.met[a, b], window.roof[a, b]
             if met > -np.inf:
-                top = max(top, passed - _TOUCHING if passed > met + _TOUCHING else high)
+                top = max(top, min(passed - _TOUCHING, high))
             known[i, j] = top
             over = np.float32(-np.inf)
             if blind:
