@@ -62,7 +62,7 @@ class Mission:
             percepts, origins = self.cameras.sense(truth)
             if self.lidars is not None:
                 percepts = self.lidars.sense(truth, percepts)
-            percepts, origins = impair(percepts, origins, truth)
+            percepts = impair(percepts, truth)
             inboxes, deliveries = self.radio.deliver(outboxes, truth)
             flying = truth.condition[:, FLYING].tolist()
             commands, outboxes, beliefs = [], [], []
