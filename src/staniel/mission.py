@@ -68,7 +68,7 @@ class Mission:
             noticed: list[tuple[int, ...]] = []
             if self.threat_sensors is not None:
                 percepts, noticed = self.threat_sensors.sense(truth, percepts)
-            percepts, origins = impair(percepts, origins, truth)
+            percepts = impair(percepts, truth)
             inboxes, deliveries = self.radio.deliver(outboxes, truth)
             flying = truth.condition[:, FLYING].tolist()
             commands, outboxes, beliefs = [], [], []

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import staniel
+from staniel.datatypes.message import Announce, Award, Bid
 from staniel.recording import read_record
-from staniel.scenario import load_scenario
+from staniel.scenario import build_city, load_scenario
+from staniel.scenario.assemble import assemble
 
 POOR = {
     "latency": 1.5,
@@ -68,3 +70,26 @@ def test_the_receptions_name_everyone_who_heard(poor):
     links = np.zeros_like(record.links)
     np.add.at(links, (record.messages["sender"][rows], hearers), 1)
     assert np.array_equal(links, record.links)
+
+
+@pytest.mark.parametrize(("latency", "hop"), [(0.0, 1), (1.0, 1), (1.2, 2), (4.0, 4)])
+def test_bids_come_in_time_however_slow_the_radio_is(latency, hop):
+    """Who is nearer than the finder of a target is awarded it: it was heard before the award."""
+    scenario = load_scenario("downtown", minutes=2.0, radio={"latency": latency})
+    mission = assemble(scenario, build_city(scenario.city, scenario.seed))
+    said, bids, sold = {}, 0, 0
+    for frame in mission.frames():
+        for delivery in frame.deliveries:
+            message = delivery.message
+            match message:
+                case Announce():
+                    said[message.sender, message.target] = message.time
+                case Bid():
+                    bids += 1
+                case Award():
+                    # Two ticks as by default, and what two hops take beyond a tick each.
+                    opened = said[message.sender, message.target]
+                    assert message.time - opened == 2.0 + 2.0 * (hop - 1)
+                    sold += message.winner != message.sender
+    assert bids > 0
+    assert sold > 0

@@ -1,6 +1,7 @@
 """The camera's options: measured rays, mounts, fading detections, merged pixels, frames, delay."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from staniel.city import City
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.equipment import Camera
-from staniel.datatypes.truth import Truth
+from staniel.datatypes.truth import CAMERA, DRIFT_X, Truth, nominal
 from staniel.errors import ScenarioError
 from staniel.kernels.camera import measure
 from staniel.kernels.footprint import camera_axes
@@ -312,6 +313,29 @@ def test_a_delay_rounds_up_to_ticks_and_keeps_the_time(delay, ticks):
         assert percept.sightings == (earlier[tick - ticks] if tick >= ticks else ())
         assert len(origins) == len(percept.sightings)
         assert percept.time == tick
+
+
+def test_what_a_camera_took_before_it_died_still_arrives_as_it_was_mapped_then():
+    """Dead from tick 4 on, and a navigation that drifts by 1 m a tick, to the east."""
+    camera, prompt = cameras(delay=2.0, **SHARP), cameras(**SHARP)
+    taken, arrived = {}, {}
+    for tick in range(9):
+        truth, _ = moving(tick)
+        for sighting in prompt.sense(truth)[0][0].sightings:
+            taken[sighting.time] = sighting
+        condition = nominal(1)
+        condition[0, CAMERA] = tick < 4
+        condition[0, DRIFT_X] = tick
+        (percept,), (origins,) = camera.sense(replace(truth, condition=condition))
+        assert len(origins) == len(percept.sightings)
+        for sighting in percept.sightings:
+            arrived[sighting.time] = sighting
+            assert tick == sighting.time + 2.0
+    assert sorted(taken) == [float(tick) for tick in range(9)]
+    assert sorted(arrived) == [0.0, 1.0, 2.0, 3.0]
+    for time, sighting in arrived.items():
+        np.testing.assert_allclose(sighting.position - taken[time].position, [time, 0.0])
+        assert sighting.pose.x - taken[time].pose.x == time
 
 
 def test_frames_and_delay_together():

@@ -34,7 +34,7 @@ from staniel.recording import read_record
 from staniel.scenario import Scenario, build_city, dump_scenario, load_scenario
 from staniel.scenario.assemble import assemble
 from staniel.world import Faults, Launch, Traffic, World, impair
-from staniel.world.faults import KINDS, Failures
+from staniel.world.faults import KINDS, Failures, taken
 
 KEY = np.uint64(11)
 LEVEL = FlyBanks((0.0,), 1.0, 15.0, 80.0)
@@ -134,13 +134,18 @@ def test_what_is_perceived_with_a_dead_camera_and_with_a_navigation_that_is_off(
     condition[2, DRIFT_X : DRIFT_X + 2] = (3.0, -4.0)
     aircraft, none = np.array(poses), np.zeros((0, 4))
     truth = Truth(1, 1.0, aircraft, none, none, aircraft[None], none[None], condition)
-    seen, origins = impair(percepts, [(7,), (8,), (9,)], truth)
+    seen = impair(percepts, truth)
     assert seen[0] is percepts[0]
-    assert (seen[1].sightings, seen[1].pose) == ((), poses[1])
-    assert origins == [(7,), (), (9,)]
-    assert seen[2].pose == poses[2]._replace(x=23.0, y=1.0)
-    assert seen[2].sightings[0].pose == seen[2].pose
-    np.testing.assert_allclose(seen[2].sightings[0].position, [23.0, 16.0])
+    assert seen[1] is percepts[1]
+    off = poses[2]._replace(x=23.0, y=1.0)
+    assert (seen[2].pose, seen[2].sightings) == (off, percepts[2].sightings)
+    looks = [[(percept.sightings[0], 7 + i)] for i, percept in enumerate(percepts)]
+    first, second, third = taken(looks, truth)
+    assert first is looks[0]
+    assert second == []
+    ((sighting, origin),) = third
+    assert (sighting.pose, origin) == (off, 9)
+    np.testing.assert_allclose(sighting.position, [23.0, 16.0])
 
 
 # -- endurance -----------------------------------------------------------------------------------

@@ -13,7 +13,9 @@ class CooperationConfig(Config):
     """The auction's patience, the hand-over margin, the search map."""
 
     mode: Literal["decentralised"] = Field("decentralised", description="who auctions")
-    bid_wait: int = Field(2, ge=1, le=10, description="ticks that an auctioneer waits for bids")
+    bid_wait: int = Field(
+        2, ge=1, le=10, description="ticks that an auctioneer waits for bids, without the latency"
+    )
     lease: float = Field(8.0, gt=0.0, description="an award without a heartbeat ends after [s]")
     handover_margin: float = Field(
         80.0, ge=0.0, description="Dubins length that a hand-over must save [m]"

@@ -19,6 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.headway import FARTHEST, GAP, behind
+from staniel.kernels.pieces import bare
 from staniel.kernels.routes import (
     AHEAD,
     CLAIM,
@@ -56,7 +57,7 @@ def all_claims(memory: Array, stretches: int) -> Indices:
     return claimed
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def give_back(memory: Array, i: int, claimed: Indices, begin: int, end: int) -> None:
     """The vehicle's claims from `begin` on and before `end` end; later ones move up."""
     for c in range(CLAIM + begin, CLAIM + CLAIMS):
@@ -68,7 +69,7 @@ def give_back(memory: Array, i: int, claimed: Indices, begin: int, end: int) -> 
         memory[i, c] = memory[i, later] if later < CLAIM + CLAIMS else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _look_ahead(
     arcs: Indices,
     corners: Array,
@@ -109,7 +110,7 @@ def _look_ahead(
     return count, start
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _unclaimed(roads: Roads, claimed: Indices, ids: Indices, begin: int, end: int, i: int) -> bool:
     """Whether no other vehicle has claimed one of these stretches, or of their rivals."""
     first, rivals = roads.first_rival, roads.rivals
@@ -124,7 +125,7 @@ def _unclaimed(roads: Roads, claimed: Indices, ids: Indices, begin: int, end: in
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _way_free(
     roads: Roads,
     vehicles: Array,
@@ -157,7 +158,7 @@ def _way_free(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def claim_speed(
     roads: Roads,
     vehicles: Array,

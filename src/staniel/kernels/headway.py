@@ -6,9 +6,9 @@ Columns, corners and legs are those of `staniel.kernels.routes`.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.pieces import bare
 from staniel.kernels.routes import (
     AHEAD,
     CURVE,
@@ -56,7 +56,7 @@ FARTHEST = 60.0
 """No driver looks farther ahead [m]."""
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def in_the_way(
     vehicles: Array,
     other: int,
@@ -81,7 +81,7 @@ def in_the_way(
     return float(along)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def behind(speed: float, gap: float, brake: float, dt: float) -> float:
     """Greatest speed from which one can slow down to `speed` within `gap`, in steps of `dt`."""
     if gap <= 0.0:
@@ -90,14 +90,14 @@ def behind(speed: float, gap: float, brake: float, dt: float) -> float:
     return max(math.sqrt(step * step + speed * speed + 2.0 * brake * gap) - step, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def sight(speed: float, habits: Array, dt: float) -> float:
     """How far away somebody can be that a driver must slow down for [m]."""
     fast = speed + habits[3] * dt
     return float(4.0 * habits[0] + 2.0 * GAP + 0.5 * fast * fast / habits[3] + fast * dt)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def anybody_within(
     vehicles: Array, near: Indices, begin: int, end: int, i: int, reach: float
 ) -> bool:
@@ -109,7 +109,7 @@ def anybody_within(
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def follow_speed(
     vehicles: Array,
     memory: Array,
@@ -156,7 +156,7 @@ def follow_speed(
     return most
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def queue_speed(
     roads: Roads,
     vehicles: Array,
@@ -197,7 +197,7 @@ def queue_speed(
     return most
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _corner_speed(memory: Array, i: int, turn_rate: float) -> float:
     """Speed in the fillet at T, or 0 where one turns in place [m/s]."""
     if memory[i, CUT] > 0.0:
@@ -205,7 +205,7 @@ def _corner_speed(memory: Array, i: int, turn_rate: float) -> float:
     return math.inf if abs(memory[i, TURN]) < SLIGHT else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def road_speed(
     entry: Array, memory: Array, i: int, x: float, y: float, habits: Array, dt: float
 ) -> float:

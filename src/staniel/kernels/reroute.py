@@ -6,11 +6,11 @@ Columns are those of `staniel.kernels.routes`.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.claims import give_back
 from staniel.kernels.headway import in_the_way
+from staniel.kernels.pieces import bare
 from staniel.kernels.routes import (
     AFTER,
     ARC,
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _room_to_turn(
     vehicles: Array,
     memory: Array,
@@ -66,7 +66,7 @@ def _room_to_turn(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def other_way(
     walls: Walls,
     roads: Roads,

@@ -21,6 +21,7 @@ from staniel.kernels.headway import (
     sight,
 )
 from staniel.kernels.neighbours import neighbours, rebuild_every
+from staniel.kernels.pieces import bare
 from staniel.kernels.random import fold
 from staniel.kernels.reroute import other_way
 from staniel.kernels.routes import (
@@ -64,7 +65,7 @@ _CRAWL = 1.0  # speed of who squeezes past [m/s]
 _LEGS = 8  # at most so many legs and fillets in one dynamics step
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _straight_on(pose: Array, memory: Array, i: int, way: float) -> bool:
     """Move the pose on its leg; False, and nothing done, where that ends before."""
     ux, uy = memory[i, TX] - pose[0], memory[i, TY] - pose[1]
@@ -76,7 +77,7 @@ def _straight_on(pose: Array, memory: Array, i: int, way: float) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _advance(
     walls: Walls,
     roads: Roads,
@@ -129,7 +130,7 @@ def _advance(
         pass_corner(walls, roads, memory, i, pose[0], pose[1], habits, key)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _swept_apart(
     vehicles: Array, near: Indices, begin: int, end: int, i: int, x: float, y: float, r: float
 ) -> bool:
@@ -144,7 +145,7 @@ def _swept_apart(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _wait(memory: Array, i: int, speed: float, habits: Array, dt: float, key: np.uint64) -> bool:
     """Keep the times of stops; whether the driver wants to stand now."""
     if habits[4] <= 0.0:
@@ -162,7 +163,7 @@ def _wait(memory: Array, i: int, speed: float, habits: Array, dt: float, key: np
     return bool(memory[i, HOLD] > 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _follow_one(
     walls: Walls,
     roads: Roads,

@@ -31,9 +31,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.pieces import bare
 from staniel.kernels.random import uniform
 from staniel.kernels.traffic import corridor
 from staniel.kernels.walls import Walls, disc_clear
@@ -109,14 +109,14 @@ class Roads(NamedTuple):
     """Stretches on which somebody would touch who is on it."""
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def draw(memory: Array, i: int, key: np.uint64) -> float:
     """The vehicle's next random number in [0, 1)."""
     memory[i, DRAWN] += 1.0
     return uniform(key, int(memory[i, DRAWN]))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _choose(roads: Roads, arc: int, chance: float) -> int:
     """An arc to go on with, by chance; back only where there is no other."""
     node, back = roads.arcs[arc, 1], roads.arcs[arc, 2]
@@ -135,7 +135,7 @@ def _choose(roads: Roads, arc: int, chance: float) -> int:
     return int(back)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def leg_clear(walls: Walls, ax: float, ay: float, bx: float, by: float, r: float) -> bool:
     """Whether a disc that fits at a can move straight to b."""
     if not disc_clear(walls, bx, by, r):
@@ -146,17 +146,13 @@ def leg_clear(walls: Walls, ax: float, ay: float, bx: float, by: float, r: float
     return corridor(walls, ax, ay, math.atan2(by - ay, bx - ax), 0.0, length, r) >= r
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def short_of(ends: Array, arc: int, x: float, y: float) -> float:
-    """How far (x, y) is before the node that an arc leads to, measured along the arc [m].
-
-    Here and below arrays of `Roads` are handed in alone: to hand in all of them takes longer than
-    what is computed.
-    """
+    """How far (x, y) is before the node that an arc leads to, measured along the arc [m]."""
     return float((ends[arc, 0] - x) * ends[arc, 2] + (ends[arc, 1] - y) * ends[arc, 3])
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def way_left(ends: Array, memory: Array, i: int, x: float, y: float) -> float:
     """How far a vehicle at (x, y) is before the node that its arc leads to [m].
 
@@ -170,7 +166,7 @@ def way_left(ends: Array, memory: Array, i: int, x: float, y: float) -> float:
     return short_of(ends, arc, x, y)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def left_on(ends: Array, memory: Array, i: int, arc: int, x: float, y: float) -> float:
     """`way_left` on an arc that need not be the vehicle's own, but may be the one it crosses."""
     if memory[i, ARC] == arc:
@@ -178,13 +174,13 @@ def left_on(ends: Array, memory: Array, i: int, arc: int, x: float, y: float) ->
     return short_of(ends, arc, x, y)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def corner_ahead(arcs: Indices, memory: Array, i: int, k: int) -> int:
     """Which of `Roads.corners` joins the `k`-th arc ahead to the one before it."""
     return int(arcs[int(memory[i, ROUTE + k - 1]), 4] + arcs[int(memory[i, ROUTE + k]), 3])
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _plan_fillet(walls: Walls, memory: Array, i: int, x: float, y: float, r: float) -> None:
     """Fillet at T for who comes straight from (x, y); wall-free like the legs and its chord.
 
@@ -208,7 +204,7 @@ def _plan_fillet(walls: Walls, memory: Array, i: int, x: float, y: float, r: flo
         memory[i, CUT], memory[i, CURVE] = cut, cut / math.tan(0.5 * abs(turn))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _look_beyond(
     walls: Walls, roads: Roads, memory: Array, i: int, x: float, y: float, habits: Array
 ) -> None:
@@ -226,7 +222,7 @@ def _look_beyond(
         memory[i, NX], memory[i, NY] = 2.0 * mx - tx, 2.0 * my - ty
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def pass_corner(
     walls: Walls,
     roads: Roads,
@@ -253,7 +249,7 @@ def pass_corner(
     _look_beyond(walls, roads, memory, i, x, y, habits)
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def set_out(
     walls: Walls,
     roads: Roads,
@@ -282,14 +278,14 @@ def set_out(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _draw_route(roads: Roads, memory: Array, i: int, arc: int, then: int, key: np.uint64) -> None:
     memory[i, ARC], memory[i, NEXT], memory[i, QUIET] = arc, then, 0.0
     for k in range(ROUTE + 2, ROUTE + AHEAD):
         memory[i, k] = _choose(roads, int(memory[i, k - 1]), draw(memory, i, key))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def turn_round(
     walls: Walls,
     roads: Roads,
@@ -328,7 +324,7 @@ def turn_round(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def contested(roads: Roads, arc: int, left: float) -> bool:
     """Whether a place so far before the arc's end is contested."""
     for k in range(roads.stretch[arc], roads.stretch[arc + 1]):

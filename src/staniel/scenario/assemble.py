@@ -1,17 +1,21 @@
 """A scenario becomes a mission that is ready to fly, and every stage gets a stream of its own."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from staniel.agent import Agent, Briefing
 from staniel.city import City
+from staniel.cooperation import CooperationConfig
 from staniel.errors import ScenarioError
 from staniel.mission import Mission
 from staniel.scenario.model import Scenario
 from staniel.world import Lidars, MixedCameras, Radio, ThreatSensors, World
 
 __all__ = ["assemble", "kernels_of"]
+
+_ROUNDING = 1e-9  # of a tick
 
 
 def assemble(scenario: Scenario, city: City) -> Mission:
@@ -53,7 +57,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         airframe=team,
         camera=scenario.camera,
         tracking=scenario.tracking,
-        cooperation=scenario.cooperation,
+        cooperation=_patient(scenario),
         guidance=scenario.guidance,
         risk=scenario.risk.briefed,
         carried=scenario.risk.carried.briefing,
@@ -103,6 +107,16 @@ def sees_buildings(scenario: Scenario) -> bool:
     """Whether the team avoids buildings, and can see them: then it may fly below the roofs."""
     seen = scenario.chart == "known" or scenario.lidar.mount != "none"
     return scenario.guidance.avoidance != "none" and seen
+
+
+def _patient(scenario: Scenario) -> CooperationConfig:
+    """Cooperation with `bid_wait` longer by what the radio takes for an announcement and a bid.
+
+    Beyond the one tick each that they take at least.
+    """
+    hop = math.ceil(scenario.radio.latency / scenario.clock.decision_step - _ROUNDING)
+    wait = scenario.cooperation.bid_wait + 2 * max(hop - 1, 0)
+    return scenario.cooperation.model_copy(update={"bid_wait": wait})
 
 
 def kernels_of(scenario: Scenario) -> list[str]:

@@ -13,6 +13,7 @@ from staniel.datatypes.truth import Truth
 from staniel.errors import ScenarioError
 from staniel.kernels.camera import Optics, detect
 from staniel.kernels.footprint import camera_axes
+from staniel.world.faults import taken
 
 __all__ = ["Cameras"]
 
@@ -37,7 +38,8 @@ class Cameras:
 
     Aircraft, vehicle and look name every draw, so that an aircraft's luck does not depend on who
     else flies, nor on whom it sees. With a delay, and only then, it remembers what was seen and not
-    yet handed out; a truth that does not follow the last one forgets it.
+    yet handed out; a truth that does not follow the last one forgets it. A camera that dies takes
+    no more pictures; what it has taken still arrives.
 
     Parameters
     ----------
@@ -158,7 +160,7 @@ class Cameras:
                     for (x, y, xx, xy, yy), origin in zip(detections[mine], who[mine], strict=True)
                 ]
             )
-        return caught
+        return taken(caught, truth)
 
 
 def _substeps(camera: Camera, clock: Clock) -> int:

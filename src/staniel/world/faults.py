@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.datatypes.belief import Percept, Pose
+from staniel.datatypes.belief import Percept, Pose, Sighting
 from staniel.datatypes.truth import CAMERA, DRIFT_X, DRIFT_Y, Truth
 from staniel.errors import ScenarioError
 from staniel.kernels.random import fold, uniform
 from staniel.world.config import Faults
 
-__all__ = ["KINDS", "Failures", "impair"]
+__all__ = ["KINDS", "Failures", "impair", "taken"]
 
 KINDS = ("camera", "radio", "navigation", "lost")
 """What can fail, in the order of the columns of `Failures.times`."""
@@ -87,47 +87,66 @@ class Failures:
         return np.maximum(time - self.times[:, _NAVIGATION], 0.0)[:, None] * self._drift
 
 
-def impair(
-    percepts: Sequence[Percept], origins: Sequence[tuple[int, ...]], truth: Truth
-) -> tuple[list[Percept], list[tuple[int, ...]]]:
-    """What is left of the percepts when cameras are dead and navigation is off.
+def impair(percepts: Sequence[Percept], truth: Truth) -> list[Percept]:
+    """What is left of the percepts where navigation is off: own pose and scan are shifted.
 
-    A dead camera delivers nothing. A navigation that is off shifts the own pose and, since they are
-    mapped from it, the places of all sightings and carriers, and the scan.
+    Sightings are impaired when they are taken, not when they arrive: see `taken`. What the threat
+    sensor noticed is mapped from the own pose, too, so its carriers are shifted.
 
     Parameters
     ----------
     percepts : sequence of Percept
-        As working equipment delivers them, one an aircraft.
-    origins : sequence of tuple of int
-        The vehicle of each sighting.
+        As equipment that works delivers them, one an aircraft.
     truth : Truth
 
     Returns
     -------
-    percepts : list of Percept
-    origins : list of tuple of int
+    list of Percept
     """
-    kept, causes = list(percepts), list(origins)
+    kept = list(percepts)
+    for i, (east, north) in enumerate(truth.condition[:, [DRIFT_X, DRIFT_Y]].tolist()):
+        if east or north:
+            kept[i] = _shifted(kept[i], east, north)
+    return kept
+
+
+def taken(
+    looks: Sequence[list[tuple[Sighting, int]]], truth: Truth
+) -> list[list[tuple[Sighting, int]]]:
+    """What cameras that may be dead take at this tick, mapped from where navigation says they are.
+
+    Parameters
+    ----------
+    looks : sequence of list of (Sighting, int)
+        As cameras that work take them, one an aircraft, each with the vehicle that it is of.
+    truth : Truth
+        At the end of the tick: a camera that died in it takes nothing in it.
+
+    Returns
+    -------
+    list of list of (Sighting, int)
+    """
+    kept = list(looks)
     condition = truth.condition[:, [CAMERA, DRIFT_X, DRIFT_Y]].tolist()
     for i, (camera, east, north) in enumerate(condition):
         if not camera:
-            kept[i], causes[i] = replace(kept[i], sightings=()), ()
-        if east or north:
-            kept[i] = _shifted(kept[i], east, north)
-    return kept, causes
+            kept[i] = []
+        elif east or north:
+            kept[i] = [(_off(sighting, east, north), origin) for sighting, origin in kept[i]]
+    return kept
+
+
+def _off(sighting: Sighting, east: float, north: float) -> Sighting:
+    """The sighting as it is mapped with a navigation that is off by (east, north)."""
+    return replace(
+        sighting,
+        position=sighting.position + np.array([east, north]),
+        pose=None if sighting.pose is None else _moved(sighting.pose, east, north),
+    )
 
 
 def _shifted(percept: Percept, east: float, north: float) -> Percept:
     """The percept as it is with a navigation that is off by (east, north)."""
-    sightings = tuple(
-        replace(
-            sighting,
-            position=sighting.position + np.array([east, north]),
-            pose=None if sighting.pose is None else _moved(sighting.pose, east, north),
-        )
-        for sighting in percept.sightings
-    )
     scan = percept.lidar
     if scan is not None:
         scan = replace(
@@ -143,7 +162,7 @@ def _shifted(percept: Percept, east: float, north: float) -> Percept:
         )
         threats = replace(threats, carriers=carriers)
     pose = _moved(percept.pose, east, north)
-    return replace(percept, pose=pose, sightings=sightings, lidar=scan, threats=threats)
+    return replace(percept, pose=pose, lidar=scan, threats=threats)
 
 
 def _moved(pose: Pose, east: float, north: float) -> Pose:
