@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from staniel.kernels.cells import Cells, line_cost, piece_cost, warm_cells
+from staniel.kernels.cells import Cells, advanced, line_cost, piece_cost, warm_cells
 from staniel.kernels.field import cost_to
 from staniel.kernels.heap import pop, push
 from staniel.kernels.shots import shot, shot_cost
@@ -41,13 +41,40 @@ class Motion(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _chain(poses: Floats, parents: NDArray[np.int32], node: int) -> Floats:
-    """Poses from the root to a node."""
+def _moves(course: float, n: int, radius: float, step: float) -> tuple[Floats, Floats]:
+    """(n,) courses, and (n, 3, 2) where a right turn, a straight and a left turn from each lead."""
+    turn = 2.0 * math.pi / n
+    courses, moves = np.empty(n), np.empty((n, 3, 2))
+    for k in range(n):
+        courses[k] = course + k * turn
+        for side in range(-1, 2):
+            bend = side / radius
+            x, y, _ = advanced(0.0, 0.0, courses[k], bend, step if side == 0 else radius * turn)
+            moves[k, side + 1, 0], moves[k, side + 1, 1] = x, y
+    return courses, moves
+
+
+@njit(cache=True, error_model="numpy")
+def _attempt(
+    cells: Cells, pose: Floats, goal: Floats, radius: float, spent: float, best: float
+) -> float:
+    """Cost of a way that ends in a whole Dubins path to the goal; infinite if `best` is better."""
+    length, word, first, middle, last = shot(
+        pose[0], pose[1], pose[2], goal[0], goal[1], goal[2], radius
+    )
+    if spent + length >= best:
+        return math.inf
+    return spent + shot_cost(cells, pose[0], pose[1], pose[2], word, first, middle, last, radius)
+
+
+@njit(cache=True, error_model="numpy")
+def _chain(poses: Floats, parents: NDArray[np.int32], node: int, more: int) -> Floats:
+    """Poses from the root to a node, and room for `more` behind them."""
     count, at = 1, node
     while parents[at] >= 0:
         at = parents[at]
         count += 1
-    chain = np.empty((count, 3))
+    chain = np.empty((count + more, 3))
     for k in range(count - 1, -1, -1):
         chain[k] = poses[node]
         node = parents[node]
@@ -95,20 +122,7 @@ def search(
     node_of = np.full(rows * columns * n, -1, dtype=np.int32)
     keys = np.empty(3 * motion.limit + 2)
     items = np.empty(3 * motion.limit + 2, dtype=np.int32)
-    # Where each primitive from each course leads to, seen from its start.
-    moves = np.empty((n, 3, 2))
-    courses = np.empty(n)
-    for k in range(n):
-        courses[k] = start[2] + k * turn
-        for side in range(-1, 2):
-            after = courses[k] + side * turn
-            if side == 0:
-                moves[k, 1, 0] = step * math.cos(courses[k])
-                moves[k, 1, 1] = step * math.sin(courses[k])
-            else:
-                moves[k, side + 1, 0] = side * radius * (math.sin(after) - math.sin(courses[k]))
-                moves[k, side + 1, 1] = -side * radius * (math.cos(after) - math.cos(courses[k]))
-
+    courses, moves = _moves(start[2], n, radius, step)
     place = math.isnan(goal[2])
     best, best_node, arrived = math.inf, -1, False
     i, j = int((start[0] - cells.west) / cells.cell), int((start[1] - cells.south) / cells.cell)
@@ -129,19 +143,15 @@ def search(
             continue
         closed[node] = True
         expanded += 1
-        x, y, course, g = poses[node, 0], poses[node, 1], poses[node, 2], spent[node]
+        x, y, g = poses[node, 0], poses[node, 1], spent[node]
         if place and math.hypot(goal[0] - x, goal[1] - y) <= tolerance and g < best:
             best, best_node, arrived = g, node, True
             continue
         ahead = field[of_state[node] // n // columns, of_state[node] // n % columns]
         if ahead < _NEAR * radius or expanded % 8 == 1:
-            length, word, first, middle, last = shot(
-                x, y, course, goal[0], goal[1], goal[2], radius
-            )
-            if g + length < best:
-                cost = g + shot_cost(cells, x, y, course, word, first, middle, last, radius)
-                if cost < best:
-                    best, best_node, arrived = cost, node, False
+            cost = _attempt(cells, poses[node], goal, radius, g, best)
+            if cost < best:
+                best, best_node, arrived = cost, node, False
         k = of_course[node]
         for side in range(-1, 2):
             xb, yb = x + moves[k, side + 1, 0], y + moves[k, side + 1, 1]
@@ -177,13 +187,10 @@ def search(
     if best_node < 0:
         outcome = GAVE_UP if expanded >= motion.limit and size > 0 else NO_WAY
         return outcome, expanded, math.inf, np.empty((0, 3))
-    chain = _chain(poses, parents, best_node)
-    if arrived:
-        return FOUND, expanded, best, chain
-    whole = np.empty((len(chain) + 1, 3))
-    whole[:-1] = chain
-    whole[-1] = goal
-    return FOUND, expanded, best, whole
+    chain = _chain(poses, parents, best_node, 0 if arrived else 1)
+    if not arrived:
+        chain[-1] = goal
+    return FOUND, expanded, best, chain
 
 
 def warm() -> None:

@@ -68,6 +68,51 @@ def _spread(costs: Floats, parents: Numbers, count: int, node: int, saved: float
 
 
 @njit(cache=True, error_model="numpy")
+def _joined(cells: Cells, a: Floats, b: Floats, radius: float, most: float) -> float:
+    """Cost of the Dubins path from pose to pose; infinite where it is not below `most`."""
+    length, word, p, q, r = shot(a[0], a[1], a[2], b[0], b[1], b[2], radius)
+    if length >= most:
+        return math.inf
+    return shot_cost(cells, a[0], a[1], a[2], word, p, q, r, radius)
+
+
+@njit(cache=True, error_model="numpy")
+def _steered(
+    nodes: Floats, count: int, sample: Floats, radius: float, stride: float, near: Numbers
+) -> tuple[int, Floats]:
+    """The node whose Dubins path to the sample is shortest, and the pose one stride along it."""
+    found = _closest(nodes, count, sample[0], sample[1], near[:_NEAREST], math.inf)
+    nearest, least = 0, math.inf
+    for f in range(found):
+        a = nodes[near[f]]
+        length = shot(a[0], a[1], a[2], sample[0], sample[1], sample[2], radius)[0]
+        if length < least:
+            nearest, least = near[f], length
+    a = nodes[nearest]
+    _, word, p, q, r = shot(a[0], a[1], a[2], sample[0], sample[1], sample[2], radius)
+    return nearest, _cut(a, word, np.array((p, q, r)), radius, stride)
+
+
+@njit(cache=True, error_model="numpy")
+def _way_to(nodes: Floats, parents: Numbers, last: int, goal: Floats, arrived: bool) -> Floats:
+    """Poses from the root to a node, and on to the goal unless that is reached."""
+    length, at = 1 if arrived else 2, last
+    while parents[at] >= 0:
+        at = parents[at]
+        length += 1
+    poses = np.empty((length, 3))
+    k = length - 1
+    if not arrived:
+        poses[k] = goal
+        k -= 1
+    while k >= 0:
+        poses[k] = nodes[last]
+        last = parents[last]
+        k -= 1
+    return poses
+
+
+@njit(cache=True, error_model="numpy")
 def grow(
     cells: Cells,
     start: Floats,
@@ -110,76 +155,47 @@ def grow(
     parents = np.full(n + 1, -1, dtype=np.int64)
     to_goal = np.full(n + 1, np.inf)
     nodes[0], costs[0], count = start, 0.0, 1
-    near = np.empty(_MOST_NEAR if optimal else _NEAREST, dtype=np.int64)
+    near = np.empty(_MOST_NEAR, dtype=np.int64)
     used, tried = 0, 0
     for s in range(n + 1):
         # The goal from the newest node, the root first.
         if tried < count:
             a = nodes[tried]
-            if math.isnan(goal[2]) and math.hypot(goal[0] - a[0], goal[1] - a[1]) <= tolerance:
-                to_goal[tried] = 0.0
-            else:
-                _, word, p, q, r = shot(a[0], a[1], a[2], goal[0], goal[1], goal[2], radius)
-                to_goal[tried] = shot_cost(cells, a[0], a[1], a[2], word, p, q, r, radius)
+            there = math.isnan(goal[2]) and math.hypot(goal[0] - a[0], goal[1] - a[1]) <= tolerance
+            to_goal[tried] = 0.0 if there else _joined(cells, a, goal, radius, math.inf)
             tried += 1
             if not optimal and to_goal[tried - 1] < math.inf:
                 break
         if s == n:
             break
         used += 1
-        sample = samples[s]
-        found = _closest(nodes, count, sample[0], sample[1], near[:_NEAREST], math.inf)
-        nearest, least = -1, math.inf
-        for f in range(found):
-            a = nodes[near[f]]
-            length = shot(a[0], a[1], a[2], sample[0], sample[1], sample[2], radius)[0]
-            if length < least:
-                nearest, least = near[f], length
-        a = nodes[nearest]
-        _, word, p, q, r = shot(a[0], a[1], a[2], sample[0], sample[1], sample[2], radius)
-        new = _cut(a, word, np.array((p, q, r)), radius, stride)
-        _, word, p, q, r = shot(a[0], a[1], a[2], new[0], new[1], new[2], radius)
-        best = costs[nearest] + shot_cost(cells, a[0], a[1], a[2], word, p, q, r, radius)
+        parent, new = _steered(nodes, count, samples[s], radius, stride, near)
+        best = costs[parent] + _joined(cells, nodes[parent], new, radius, math.inf)
         if best == math.inf:
             continue
-        parent, found = nearest, 0
+        found = 0
         if optimal:
             # So that the balls cover the plane more thinly the more nodes there are.
             reach = max(12.0 * stride * math.sqrt(math.log(count + 1.0) / (count + 1.0)), stride)
             found = _closest(nodes, count, new[0], new[1], near, reach)
-            for f in range(found):
-                b = nodes[near[f]]
-                length, word, p, q, r = shot(b[0], b[1], b[2], new[0], new[1], new[2], radius)
-                if costs[near[f]] + length < best:
-                    cost = shot_cost(cells, b[0], b[1], b[2], word, p, q, r, radius)
-                    if costs[near[f]] + cost < best:
-                        best, parent = costs[near[f]] + cost, near[f]
+        for f in range(found):
+            k = near[f]
+            cost = costs[k] + _joined(cells, nodes[k], new, radius, best - costs[k])
+            if cost < best:
+                best, parent = cost, k
         nodes[count], costs[count], parents[count] = new, best, parent
         count += 1
         for f in range(found):
-            b = nodes[near[f]]
-            length, word, p, q, r = shot(new[0], new[1], new[2], b[0], b[1], b[2], radius)
-            if best + length < costs[near[f]]:
-                cost = best + shot_cost(cells, new[0], new[1], new[2], word, p, q, r, radius)
-                if cost < costs[near[f]]:
-                    parents[near[f]] = count - 1
-                    _spread(costs, parents, count, near[f], costs[near[f]] - cost)
+            k = near[f]
+            cost = best + _joined(cells, new, nodes[k], radius, costs[k] - best)
+            if cost < costs[k]:
+                parents[k] = count - 1
+                _spread(costs, parents, count, k, costs[k] - cost)
     last = int(np.argmin(costs[:count] + to_goal[:count]))
     total = costs[last] + to_goal[last]
     if total == math.inf:
         return total, used, np.empty((0, 3))
-    length, at = 1, last
-    while parents[at] >= 0:
-        at = parents[at]
-        length += 1
-    more = 1 if to_goal[last] > 0.0 else 0
-    poses = np.empty((length + more, 3))
-    if more == 1:
-        poses[length] = goal
-    for k in range(length - 1, -1, -1):
-        poses[k] = nodes[last]
-        last = parents[last]
-    return total, used, poses
+    return total, used, _way_to(nodes, parents, last, goal, to_goal[last] == 0.0)
 
 
 def warm() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.guidance.planning.problem import NoPath, Plan, Problem
+from staniel.kernels.cells import line_cost
 from staniel.kernels.through import chain
 
 __all__ = ["dubins_along", "taut"]
@@ -19,8 +20,6 @@ _MOST = 80  # places on the way
 
 def taut(problem: Problem, way: Floats) -> Floats:
     """The places (m, 2) of a free way without those between which one sees one another."""
-    from staniel.kernels.cells import line_cost
-
     kept, at = [0], 0
     cells = problem.cells
     while at < len(way) - 1:
@@ -64,11 +63,12 @@ def dubins_along(problem: Problem, way: Floats, work: int) -> Plan | NoPath:
         for side in (-reach, reach)
     )
     courses = np.arctan2(*(after - before).T[::-1])
-    poses = np.empty((5 * len(places) + 2, 3))
+    tried = len(_COURSES)
+    poses = np.empty((tried * len(places) + 2, 3))
     poses[0], poses[-1] = problem.from_pose, problem.to_pose
-    poses[1:-1, :2] = np.repeat(places, 5, axis=0)
+    poses[1:-1, :2] = np.repeat(places, tried, axis=0)
     poses[1:-1, 2] = (courses[:, None] + _COURSES).ravel()
-    layers = np.concatenate(([0], np.repeat(np.arange(len(places)), 5) + 1, [len(places) + 1]))
+    layers = np.concatenate(([0], np.repeat(np.arange(len(places)), tried) + 1, [len(places) + 1]))
     cost, kept = chain(problem.cells, poses, layers, _WINDOW, problem.turn_radius)
     if math.isinf(cost):
         return NoPath("limit", work)
