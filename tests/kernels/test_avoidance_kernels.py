@@ -154,7 +154,7 @@ def test_what_the_lidar_opens_is_in_the_open_and_apart_from_every_wall(seed):
     free = [p for p in places if min(o.distance(shapely.Point(p)) for o in tall) > 12.0][:8]
     for x, y in free:
         window, corner = scanned(city, x, y, z)
-        points = opened(tops(window, corner, CELL, 6.0, np.inf, True, x, y), z)
+        points = opened(tops(window, corner, CELL, 6.0, np.inf, True), z)
         assert len(points) > 20
         apart = shapely.distance(shapely.union_all(tall), shapely.points(points))
         assert apart.min() > 3.0  # the clearance, less the cells' own size
@@ -162,7 +162,7 @@ def test_what_the_lidar_opens_is_in_the_open_and_apart_from_every_wall(seed):
 
 def test_open_ground_is_open_as_far_as_the_lidar_reaches_and_no_farther():
     window, corner = scanned(City.open((500.0, 500.0)), 250.0, 250.0, 30.0)
-    points = opened(tops(window, corner, CELL, 6.0, np.inf, True, 250.0, 250.0), 30.0)
+    points = opened(tops(window, corner, CELL, 6.0, np.inf, True), 30.0)
     away = np.linalg.norm(points - 250.0, axis=1)
     assert away.max() < 140.0
     assert len(points) * CELL**2 == pytest.approx(math.pi * 130.0**2, rel=0.08)
@@ -170,21 +170,21 @@ def test_open_ground_is_open_as_far_as_the_lidar_reaches_and_no_farther():
 
 def test_half_a_fan_opens_half_and_what_is_above_counts_for_above_only():
     window, corner = scanned(City.open((500.0, 500.0)), 250.0, 250.0, 30.0, aperture=180)
-    air = tops(window, corner, CELL, 6.0, np.inf, True, 250.0, 250.0)
+    air = tops(window, corner, CELL, 6.0, np.inf, True)
     assert opened(air, 30.0)[:, 0].min() > 235.0
     assert len(opened(air, 45.0)) == len(opened(air, 30.0))
     assert len(opened(air, 25.0)) < 60  # only where it is itself
-    assert len(opened(tops(window, corner, CELL, 6.0, 20.0, True, 250.0, 250.0), 25.0)) == N * N
+    assert len(opened(tops(window, corner, CELL, 6.0, 20.0, True), 25.0)) == N * N
 
 
 def test_a_wall_seen_from_above_is_flown_over_where_it_was_seen_to_end():
     city = City.from_outlines([shapely.box(300.0, 200.0, 320.0, 300.0)], [40.0], (500.0, 500.0))
     window, corner = scanned(city, 250.0, 250.0, 30.0)
-    assert not len(_near(opened(tops(window, corner, CELL, 6.0, np.inf, True, 250.0, 250.0), 45.0)))
+    assert not len(_near(opened(tops(window, corner, CELL, 6.0, np.inf, True), 45.0)))
     origins = np.tile([250.0, 250.0], (361, 1))
     angles = np.radians(np.arange(-180.0, 181.0))
     mark(window, corner, CELL, 42.0, origins, angles, np.full(361, np.inf), 140.0, 0.1)
-    air = tops(window, corner, CELL, 6.0, np.inf, True, 250.0, 250.0)
+    air = tops(window, corner, CELL, 6.0, np.inf, True)
     assert len(_near(opened(air, 42.0)))
     assert not len(_near(opened(air, 35.0)))
 
@@ -209,7 +209,7 @@ def test_the_chart_closes_its_buildings_up_to_their_roofs():
     city = City.generate(size=(300.0, 300.0), seed=5)
     chart = City.open((300.0, 300.0))
     window, corner = scanned(chart, 150.0, 150.0, 90.0, chart=city)
-    air = tops(window, corner, CELL, 6.0, city.tallest + 2.0, False, 150.0, 150.0)
+    air = tops(window, corner, CELL, 6.0, city.tallest + 2.0, False)
     for z in (12.0, 25.0, 35.0):
         points = shapely.points(opened(air, z))
         tall = [o for o, h in zip(city.outlines, city.heights, strict=True) if h > z]

@@ -17,6 +17,9 @@ CELL = 3.0
 REACH = 150.0
 """Half the side of the window [m]: the way of eight seconds, and room for a circle on the way."""
 
+START = 20.0
+"""Around the place where it first looks an aircraft takes the air to be clear [m]."""
+
 ROOF_MARGIN = 2.0
 """Height kept above the roofs of the chart [m]."""
 
@@ -77,7 +80,8 @@ class Surroundings:
         )
         self._corner = corner
         if scan is not None:
-            self._looked = True
+            if not self._looked:
+                self._begin(pose)
             mark(
                 self._window,
                 corner,
@@ -96,9 +100,17 @@ class Surroundings:
             self._clearance,
             self.ceiling,
             self._blank and self._looked,
-            pose.x,
-            pose.y,
         )
+
+    def _begin(self, pose: Pose) -> None:
+        """Take the place where it looks for the first time to be clear: it got there."""
+        self._looked = True
+        passed, n = self._window.passed, len(self._window.passed)
+        most = math.ceil(START / CELL)
+        for i, j in np.ndindex(2 * most + 1, 2 * most + 1):
+            east, north = math.floor(pose.x / CELL) + i - most, math.floor(pose.y / CELL) + j - most
+            if math.hypot(i - most, j - most) * CELL <= START:
+                passed[east % n, north % n] = pose.z
 
 
 _EMPTY = (np.inf, -np.inf, -np.inf)

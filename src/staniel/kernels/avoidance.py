@@ -128,7 +128,8 @@ def _banned(bans: Bans, x: float, y: float, z: float) -> int:
 def badness(harm: Floats) -> float:
     """One number for what is wrong: walls and real nearness of others first, then bans.
 
-    Of the distance to keep from others more than half is for what nobody expects of them.
+    A fraction of a second in closed air is a matter of its cells and of the clearance, not of a
+    wall; and of the distance to keep from others half is for what nobody expects of them.
 
     Parameters
     ----------
@@ -139,8 +140,9 @@ def badness(harm: Floats) -> float:
     -------
     float
     """
-    near = harm[_NEAR]
-    total: float = 1e4 * harm[_WALL] + 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
+    wall, near = harm[_WALL], harm[_NEAR]
+    total: float = 1e4 * max(wall - 0.3, 0.0) + 30.0 * wall
+    total += 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
     return total
 
 

@@ -26,6 +26,12 @@ _TOUCHING = np.float32(0.3)
 """Heights nearer than this are one: what the altitude hold leaves open [m]."""
 
 
+_PARTLY = 1.5
+"""What nobody has looked at is grown by so many cells more than what stands there: a wall that
+comes into sight may do so in a cell of which beams had passed another part. So it closes nothing
+that was open."""
+
+
 class Window(NamedTuple):
     """The cells, n by n; rows are east."""
 
@@ -183,8 +189,6 @@ def tops(
     clearance: float,
     ceiling: float,
     blind: bool,
-    x: float,
-    y: float,
 ) -> Tops:
     """Where not to fly, and below which height.
 
@@ -200,13 +204,10 @@ def tops(
         No building is higher, as far as the aircraft was told; may be infinite.
     blind : bool
         What nobody has looked at is closed.
-    x, y : float [m]
-        Where the aircraft is: the cells around it were entered.
 
     Returns
     -------
     Tops
-        The cells next to the aircraft count as looked at: it is there.
     """
     n = window.passed.shape[0]
     known, unseen = np.empty((n, n), dtype=np.float32), np.empty((n, n), dtype=np.float32)
@@ -222,16 +223,10 @@ def tops(
             if blind:
                 over = passed - _TOUCHING if passed < np.inf else high
             unseen[i, j] = max(top, min(over, high))
-    own_i, own_j = math.floor(x / cell) - corner[0], math.floor(y / cell) - corner[1]
-    for i in range(max(own_i - 3, 0), min(own_i + 4, n)):
-        for j in range(max(own_j - 3, 0), min(own_j + 4, n)):
-            unseen[i, j] = known[i, j]
-    # Both by as much, so that a wall that comes into sight closes nothing that was open. A return
-    # is within 0.7 cells of the middle of its own.
-    radius = clearance / cell + 0.7
+    radius = clearance / cell + 0.7  # a return is within 0.7 cells of the middle of its own
     solid, closed = known.copy(), unseen.copy()
     _grow(known, solid, radius)
-    _grow(unseen, closed, radius)
+    _grow(unseen, closed, radius + _PARTLY)
     return Tops(solid, closed, corner[0] * cell, corner[1] * cell, cell)
 
 
@@ -241,4 +236,4 @@ def warm() -> None:
     window, corner, one = Window(*cells), np.zeros(2, dtype=np.int64), np.zeros(1)
     forget(window, corner, corner + 9, 1.0, warm_walls(), one, 1.0)
     mark(window, corner, 1.0, 1.0, np.zeros((1, 2)), one, one, 1.0, 0.1)
-    tops(window, corner, 1.0, 1.0, 1.0, True, 1.0, 1.0)
+    tops(window, corner, 1.0, 1.0, 1.0, True)
