@@ -15,8 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
-from staniel.world.aircraft import encode, limits
 
+from staniel.datatypes.autopilot import encode, limits
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.command import Command, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import Airframe
