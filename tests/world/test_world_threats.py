@@ -1,7 +1,6 @@
 """The threat sensor: range in space, chance, noise, sight, keys, and what it does not tell."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -185,12 +184,12 @@ def test_a_drifting_navigation_shifts_carriers_with_the_sightings_and_no_region(
     truth = truth_of([EVERYBODY], [(10, 0)], condition=condition)
     percepts, _ = sense(truth, disc(), carried=CARRIED)
     seen = Sighting(3.0, percepts[0].threats.carriers[0].position, np.eye(2))
-    percepts = [replace(percepts[0], sightings=(seen,))]
-    (shifted,), _ = impair(percepts, [(0,)], truth)
+    (((sighting, _),),) = taken([[(seen, 0)]], truth)
+    (shifted,) = impair(percepts, truth)
     assert shifted.threats.regions == (disc(),)
     moved = shifted.threats.carriers[0].position
     np.testing.assert_allclose(moved - percepts[0].threats.carriers[0].position, (30.0, -7.0))
-    assert np.array_equal(moved, shifted.sightings[0].position)
+    assert np.array_equal(moved, sighting.position)
 
 
 @pytest.mark.parametrize(
