@@ -15,6 +15,7 @@ from staniel.datatypes.truth import DRIFT_X, DRIFT_Y, FLYING, Truth, nominal
 from staniel.errors import ScenarioError
 from staniel.scenario import dump_scenario, load_scenario
 from staniel.world import ThreatSensors, impair
+from staniel.world.faults import taken
 
 OPEN = City.open((1000.0, 1000.0))
 EVERYBODY = (0.0, 0.0, 80.0)
