@@ -21,7 +21,6 @@ from rich.console import Console
 from rich.table import Table
 from scipy import stats
 
-from staniel.datatypes.truth import FLYING
 from staniel.kernels.warm import warm_all
 from staniel.scenario import Scenario, build_city, load_scenario
 from staniel.scenario.assemble import assemble
@@ -109,11 +108,10 @@ def fly(number: int, policy: str, minutes: float) -> Outcome:
     scenario = scenario_of(number, policy, minutes)
     city = build_city(scenario.city, number)
     mission = assemble(scenario, city)
-    paths, guards, flying = [], [], []
+    paths, guards = [], []
     for frame in mission.frames():
         paths.append(frame.truth.aircraft_path)
         guards += [belief.guard for belief in frame.beliefs]
-        flying.append(frame.truth.condition[:, FLYING])
     path = np.concatenate(paths)
     count = path.shape[1]
     places = path[:, :, :3]
