@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -247,6 +248,76 @@ def test_a_scan_moves_with_its_aircraft(turn, east, north):
     for before, after in zip(here, there, strict=True):
         np.testing.assert_allclose(after.start, rotation @ before.start + (east, north), atol=1e-7)
         np.testing.assert_allclose(after.end, rotation @ before.end + (east, north), atol=1e-7)
+
+
+def surprise(line, rho, alpha):
+    """Squared Mahalanobis distance of the true line, in a frame at the middle of the wall."""
+    middle = 0.5 * (np.array(line.start) + line.end)
+    distance, covariance = line.about(tuple(middle))
+    true = rho - middle @ (math.cos(alpha), math.sin(alpha))
+    error = np.array([distance - true, wrap(line.alpha - alpha)])
+    return float(error @ np.linalg.solve(covariance, error))
+
+
+def test_a_frame_at_the_wall_is_that_of_shifted_points():
+    rng = np.random.default_rng(8)
+    points = np.column_stack((np.linspace(300, 330, 20), np.linspace(500, 510, 20)))
+    points += 0.1 * rng.standard_normal(points.shape)
+    spreads = np.tile(0.01 * np.eye(2), (20, 1, 1))
+    far, here = fit_line(points, spreads), np.array((310.0, 490.0))
+    near = fit_line(points - here, spreads)
+    distance, covariance = far.about(tuple(here))
+    assert (distance, far.alpha) == pytest.approx((near.rho, near.alpha), abs=1e-9)
+    np.testing.assert_allclose(covariance, near.covariance, rtol=1e-6)
+
+
+def test_walls_of_a_whole_city_are_where_their_covariance_says():
+    """Where all returns are of one wall, chi-squared; and few walls have others among theirs."""
+    limit, pure, mixed = stats.chi2(2).ppf(0.9973), [], []
+    for seed in (1, 2, 3):
+        city = City.generate(seed=seed)
+        rings = [outline.exterior.coords for outline in city.outlines]
+        sides = [side for ring in rings for side in pairwise(ring)]
+        tree = shapely.STRtree([shapely.LineString(side) for side in sides])
+        built, rng, looks = shapely.union_all(city.outlines), np.random.default_rng(0), 0
+        while looks < 50:
+            x, y = rng.uniform(0.0, city.size)
+            if built.distance(shapely.Point(x, y)) < 2.0:
+                continue
+            looks += 1
+            scan = scan_of(city, x, y, rng.uniform(-3, 3), tick=looks)
+            lines = fit_walls(scan)
+            if not lines:
+                continue
+            points, clean = scan.points(), true_points(built, scan)
+            for line in lines:
+                normal = np.array((math.cos(line.alpha), math.sin(line.alpha)))
+                along = np.array((-normal[1], normal[0]))
+                low, high = sorted((np.dot(line.start, along), np.dot(line.end, along)))
+                own = np.abs(points @ normal - line.rho) < 1.0
+                own &= (points @ along > low - 1e-6) & (points @ along < high + 1e-6)
+                walls = tree.query_nearest(shapely.points(clean[own]), all_matches=False)[1]
+                wall = np.bincount(walls).argmax()
+                rho, alpha = wall_of(*sides[wall])
+                others = np.abs(clean[own] @ (math.cos(alpha), math.sin(alpha)) - rho) > 1e-6
+                (mixed if others.any() else pure).append(surprise(line, rho, alpha))
+    beyond = int((np.array(pure) > limit).sum())
+    assert len(pure) > 400
+    assert stats.binomtest(beyond, len(pure), 0.0027).pvalue > 1e-3
+    assert stats.kstest(pure, "chi2", args=(2,)).pvalue > 1e-3
+    everything = np.array(pure + mixed)
+    assert (everything > limit).mean() < 0.04
+    assert (np.array(mixed) > limit).mean() < 0.35
+
+
+def true_points(built, scan):
+    """Where each beam that returned first meets a building."""
+    directions = scan.directions()[scan.returned]
+    origin = np.array((scan.pose.x, scan.pose.y))
+    beams = shapely.linestrings([[origin, origin + 150.0 * way] for way in directions])
+    met = shapely.intersection(beams, built.boundary)
+    gaps = [shapely.distance(shapely.Point(origin), places) for places in met]
+    return origin + np.array(gaps)[:, None] * directions
 
 
 def test_isolated_returns_are_dropped():

@@ -33,7 +33,8 @@ class WallLine:
     alpha : float [rad]
         Direction from the origin to the nearest point of the line, in (-pi, pi].
     covariance : (2, 2) float array [m², m rad, rad²]
-        Of rho and alpha.
+        Of rho and alpha, to the first order. Far from the origin rho hangs on alpha by a long lever
+        and is not normal: compare lines by `about`.
     start, end : (float, float) [m]
         The outermost returns, put onto the line, in the order in which they were handed in.
     returns : int
@@ -46,6 +47,34 @@ class WallLine:
     start: Point
     end: Point
     returns: int
+
+    def about(self, point: Point) -> tuple[float, Floats]:
+        """How far the line is from a point, and the covariance of that and of alpha.
+
+        Parameters
+        ----------
+        point : (float, float) [m]
+            Near the wall, as the middle between its ends: there the errors are normal.
+
+        Returns
+        -------
+        distance : float [m]
+            In the direction alpha from the point, negative against it.
+        covariance : (2, 2) float array [m², m rad, rad²]
+            Of the distance and alpha.
+
+        Examples
+        --------
+        >>> line = fit_line([[5.0, 100.0], [5.0, 102.0]], 0.1)
+        >>> distance, covariance = line.about((4.0, 101.0))
+        >>> round(distance, 9), np.sqrt(np.diag(line.covariance)), np.sqrt(np.diag(covariance))
+        (1.0, array([7.14..., 0.07...]), array([0.07..., 0.07...]))
+        """
+        cos, sin = math.cos(self.alpha), math.sin(self.alpha)
+        lever = point[1] * cos - point[0] * sin
+        jacobian = np.array([[1.0, -lever], [0.0, 1.0]])
+        moved: Floats = jacobian @ self.covariance @ jacobian.T
+        return self.rho - point[0] * cos - point[1] * sin, moved
 
 
 def fit_line(points: ArrayLike, covariance: ArrayLike) -> WallLine:

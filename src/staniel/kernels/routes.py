@@ -308,7 +308,9 @@ def turn_round(
     u = math.hypot(ux, uy)
     ux, uy = ux / u, uy / u
     aside = (x - px) * uy - (y - py) * ux
-    if aside < r:
+    # Who comes round the corner at the beginning of the way back must see it in time.
+    to_node = u - (x - px) * ux - (y - py) * uy
+    if aside < r or to_node < 10.0 * r:
         return False
     tx, ty = x - 2.0 * aside * uy, y + 2.0 * aside * ux
     place = roads.arcs[back, 4] + roads.arcs[then, 3]
