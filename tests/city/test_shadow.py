@@ -80,23 +80,28 @@ def test_contains_what_is_seen_over_a_whole_city():
     assert 0.1 * asked < seen < 0.6 * asked
 
 
+N = 5
+houses = st.lists(
+    st.tuples(st.integers(0, N * N - 1), st.integers(1, 4)), max_size=N * N, unique_by=lambda h: h[0]
+)
+eyes = st.tuples(st.integers(-1, N + 1), st.integers(-1, N + 1), st.integers(1, 7))
+
+
 @settings(max_examples=60, deadline=None)
-@given(st.data())
-def test_houses_that_touch_at_corners_and_walls(data):
+@given(houses, eyes)
+# Joined with floating noding, a third of these shadows was lost without a word.
+@example([(7, 1), (8, 1), (9, 3), (10, 2), (18, 1), (19, 3), (24, 1)], (5, 6, 3))
+def test_houses_that_touch_at_corners_and_walls(houses, eye):
     """An eye over the grid's own lines: half of the walls are seen edge on.
 
     The points are on none of the rays through the grid's nodes, where a slit between two houses
     that touch at a corner lets light through.
     """
-    n = 5
-    taken = data.draw(st.lists(st.booleans(), min_size=n * n, max_size=n * n))
-    squares = [shapely.box(k % n, k // n, k % n + 1, k // n + 1) for k in range(n * n) if taken[k]]
-    roofs = data.draw(st.lists(st.integers(1, 4), min_size=len(squares), max_size=len(squares)))
-    city = City.from_outlines(squares, np.array(roofs, dtype=float), (n, n))
-    place = data.draw(st.tuples(st.integers(-1, n + 1), st.integers(-1, n + 1), st.integers(1, 7)))
-    nodes = np.arange(-4, 2 * n + 5) / 2.0
+    squares = [shapely.box(k % N, k // N, k % N + 1, k // N + 1) for k, _ in houses]
+    city = City.from_outlines(squares, np.array([roof for _, roof in houses], dtype=float), (N, N))
+    nodes = np.arange(-4, 2 * N + 5) / 2.0
     points = np.stack(np.meshgrid(nodes + 0.2371, nodes + 0.1913), axis=-1).reshape(-1, 2)
-    check(city, Pose(*map(float, place), 0.0, 0.1, 15.0), 1.5, 60.0, 0.0, points)
+    check(city, Pose(*map(float, eye), 0.0, 0.1, 15.0), 1.5, 60.0, 0.0, points)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared maps are not here")

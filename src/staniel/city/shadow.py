@@ -19,6 +19,10 @@ Floats = NDArray[np.float64]
 _ROUNDING = 1e-6
 """A smaller patch is what rounding leaves between two shadows with a common edge [m²]."""
 
+_GRID = 1e-8
+"""Areas are joined on a grid of this size [m]. Without one, GEOS now and then loses whole areas
+where many nearly meet, without a word; with one it snaps what is nearer than that, and is safe."""
+
 _LONGEST = 1e7
 """A shadow is drawn out to at most this many times the distance of its wall."""
 
@@ -79,7 +83,11 @@ def visible_ground(
     if not city.visible(eye[None], eye[None])[0, 0]:
         return shapely.MultiPolygon()
     covered = shapely.Polygon(corners.polygon)
-    dark = shapely.union_all(shadows(city, eye, covered, height))
+    # Within the footprint's box no number is so large that the grid would be finer than its digits.
+    cast = shapely.intersection(shadows(city, eye, covered, height), shapely.box(*covered.bounds))
+    cast = shapely.get_parts(cast)
+    # What only touches the box is a point or a line there, and hides nothing.
+    dark = shapely.union_all(cast[shapely.get_dimensions(cast) == 2], grid_size=_GRID)
     lit = shapely.get_parts(shapely.difference(covered, dark))
     return shapely.MultiPolygon(lit[shapely.area(lit) > _ROUNDING].tolist())
 
@@ -105,7 +113,8 @@ def visible_share(city: City, grounds: Iterable[BaseGeometry]) -> float:
     0.5
     """
     open_ground = (1.0 - city.density) * city.size[0] * city.size[1]
-    seen = shapely.union_all(list(grounds)).intersection(shapely.box(0.0, 0.0, *city.size))
+    joined = shapely.union_all(list(grounds), grid_size=_GRID)
+    seen = joined.intersection(shapely.box(0.0, 0.0, *city.size))
     return min(seen.area / open_ground, 1.0) if open_ground > 0.0 else 0.0
 
 
