@@ -37,7 +37,7 @@ FORESIGHT = 8.0
 NEIGHBOURHOOD = 450.0
 """Other aircraft beyond are not reckoned with [m]: twice the way of `FORESIGHT`, and a turn."""
 
-_STRIDE = 0.25  # of the dynamics beyond the decision step [s]
+_LOOKS = 0.25  # beyond the decision step, so often a way is looked at, or a little oftener [s]
 _APART_FOR = 7.0  # how long an escape keeps away from where others are expected [s]
 _SHORT = 2.0  # what a metre that a way falls short of `FORESIGHT` counts
 _BANNED = 1e3  # what a second in a ban counts [m]
@@ -73,7 +73,8 @@ class Predictive:
         self._around = Surroundings(chart, config.clearance, lidar.range, config.safe_altitude)
         self._neighbours = Neighbours(own, airframe, config)
         self._drift = Drift(clock.decision_step)
-        self._rules = Rules(clock.dynamics_step, clock.substeps, _STRIDE, FORESIGHT, _APART_FOR)
+        stride = max(int(_LOOKS / clock.dynamics_step), 1)
+        self._rules = Rules(clock.dynamics_step, clock.substeps, stride, FORESIGHT, _APART_FOR)
         self._regions: tuple[RiskRegion, ...] = ()
         self._bans = bans((), config)
         self._escape: Floats | None = None
@@ -113,7 +114,7 @@ class Predictive:
         self._escape, self._heading = choice.escape, None
         if guard and row[0] == LINE:
             self._heading = math.atan2(row[6] - row[4], row[5] - row[3])
-        drift.expect(choice.height, choice.climb)
+        drift.expect(choice.there, choice.climb)
         return decode(row) if guard else command, guard
 
     def _choose(

@@ -59,11 +59,11 @@ class Rules(NamedTuple):
     """How far ahead to look, and what is better than what."""
 
     dt: float
-    """Of the dynamics [s]; ways are flown out so for the first decision step."""
+    """Of the dynamics [s]."""
     substeps: int
-    """Of a decision step."""
-    stride: float
-    """Of the dynamics after that [s]."""
+    """Of a decision step; after each of the first one's is looked at where the way leads."""
+    stride: int
+    """After that it is looked at only so often: after this many substeps."""
     foresight: float
     """How far a command is flown out over what is known [s]."""
     apart_for: float
@@ -79,8 +79,8 @@ class Choice(NamedTuple):
     """(COMMAND_WIDTH,) what to fly afterwards, if nothing better is found."""
     harm: Floats
     """(3,) seconds in closed air, how near others come, seconds banned; zeros: verified."""
-    height: float
-    """After the decision step [m]."""
+    there: Floats
+    """(6,) state after the decision step."""
     climb: float
     """Rate then [m/s]."""
 
@@ -142,7 +142,7 @@ def badness(harm: Floats) -> float:
     """
     wall, near = harm[_WALL], harm[_NEAR]
     total: float = 1e4 * max(wall - 0.3, 0.0) + 30.0 * wall
-    total += 1e4 * max(near - 0.5, 0.0) + 50.0 * near + 10.0 * harm[_BAN]
+    total += 1e4 * max(near - 0.5, 0.0) + 5.0 * near + 10.0 * harm[_BAN]
     return total
 
 
@@ -155,7 +155,8 @@ def _fly_out(
     wind: Floats,
     start: float,
     dt: float,
-    steps: int,
+    stride: int,
+    looks: int,
     tops: Tops,
     closed: bool,
     others: Others,
@@ -167,22 +168,24 @@ def _fly_out(
 ) -> tuple[float, float]:
     """Fly a command, `state` in place, and add to `harm` what is wrong on the way.
 
+    It is looked at `looks` times, after every `stride` substeps of `dt`.
+
     Bans of a `tolerated` level do not count. It stops where that is as bad as `enough`.
 
     Returns the climb rate and when the way first meets something, infinite where it does not. What
     comes early weighs more: there is less time to think again.
     """
-    first = np.inf
-    for k in range(steps):
+    first, time, seen = np.inf, start, dt * stride
+    for look in range(looks):
         if first < np.inf and badness(harm) >= enough:
             break
-        elapsed = start + k * dt
-        climb = fly_step(state, climb, command, limits, wind[0], wind[1], elapsed, dt)
-        time = elapsed + dt
+        for k in range(stride):
+            climb = fly_step(state, climb, command, limits, wind[0], wind[1], time + k * dt, dt)
+        time = start + (look + 1) * seen
         x, y, z = state[0], state[1], state[2]
         wrong = False
         if _blocked(tops, closed, x, y, z):
-            harm[_WALL] += dt * math.exp(-0.2 * time)
+            harm[_WALL] += seen * math.exp(-0.2 * time)
             wrong = True
         if time <= apart_until:
             near = _too_near(others, x, y, z, time) * math.exp(-0.1 * time)
@@ -190,7 +193,7 @@ def _fly_out(
             wrong = wrong or near > 0.0
         level = _banned(bans, x, y, z)
         if level > tolerated:
-            harm[_BAN] += dt if level > 1 else _MARGINAL * dt
+            harm[_BAN] += seen if level > 1 else _MARGINAL * seen
             wrong = True
         if wrong and first == np.inf:
             first = time
@@ -272,19 +275,19 @@ def ways(
     """
     m = commands.shape[0]
     ends, clear, banned_for = np.empty((m, 2)), np.empty(m), np.zeros(m)
-    steps = int((rules.foresight - rules.dt * rules.substeps) / rules.stride + 0.5)
+    seen = rules.dt * rules.stride
+    looks = int((rules.foresight - rules.dt * rules.substeps) / seen + 0.5)
     for c in range(m):
         own, harm = state.copy(), np.zeros(3)
         rate, time = climb, 0.0
         clear[c] = rules.foresight
-        for k in range(1 + steps):
-            dt = rules.dt if k == 0 else rules.stride
-            count = rules.substeps if k == 0 else 1
+        for k in range(1 + looks):
+            stride, count = (1, rules.substeps) if k == 0 else (rules.stride, 1)
             rate, first = _fly_out(
-                own, rate, commands[c], limits, wind, time, dt, count, tops, False, others, np.inf,
-                bans, 0, harm, np.inf,
+                own, rate, commands[c], limits, wind, time, rules.dt, stride, count, tops, False,
+                others, np.inf, bans, 0, harm, np.inf,
             )  # fmt: skip
-            time += count * dt
+            time += rules.dt * stride * count
             if first < np.inf and clear[c] >= rules.foresight:
                 clear[c] = first
                 ends[c, 0], ends[c, 1] = own[0], own[1]
@@ -327,12 +330,12 @@ def choose(
     """
     within = _banned(bans, state[0], state[1], state[2])
     best, least, least_harm = order[0], np.inf, np.zeros(3)
-    best_escape, best_height, best_climb = np.zeros(COMMAND_WIDTH), state[2], climb
+    best_escape, best_there, best_climb = np.zeros(COMMAND_WIDTH), state, climb
     for place in range(order.shape[0]):
         c = order[place]
         there, first_harm = state.copy(), np.zeros(3)
         rate, _ = _fly_out(
-            there, climb, commands[c], limits, wind, 0.0, rules.dt, rules.substeps,
+            there, climb, commands[c], limits, wind, 0.0, rules.dt, 1, rules.substeps,
             tops, True, others, rules.apart_for, bans, within, first_harm, least,
         )  # fmt: skip
         if badness(first_harm) >= least:
@@ -343,17 +346,17 @@ def choose(
                 continue
             own, harm = there.copy(), first_harm.copy()
             _fly_out(
-                own, rate, circles[e], limits, wind, rules.dt * rules.substeps, rules.stride,
-                int(seconds[e] / rules.stride), tops, True, others, rules.apart_for, bans, within,
-                harm, least,
+                own, rate, circles[e], limits, wind, rules.dt * rules.substeps, rules.dt,
+                rules.stride, int(seconds[e] / (rules.dt * rules.stride)), tops, True, others,
+                rules.apart_for, bans, within, harm, least,
             )  # fmt: skip
             total = badness(harm)
             if total < least:
                 best, least, least_harm = c, total, harm
-                best_escape, best_height, best_climb = circles[e].copy(), there[2], rate
+                best_escape, best_there, best_climb = circles[e].copy(), there, rate
             if least == 0.0:
-                return Choice(best, best_escape, least_harm, best_height, best_climb)
-    return Choice(best, best_escape, least_harm, best_height, best_climb)
+                return Choice(best, best_escape, least_harm, best_there, best_climb)
+    return Choice(best, best_escape, least_harm, best_there, best_climb)
 
 
 def warm() -> None:
@@ -371,7 +374,7 @@ def warm() -> None:
         Tops(cells, cells, 0.0, 0.0, 3.0),
         Others(np.zeros((0, 1, 3)), np.zeros((0, 1, 2)), 1.0),
         Bans(none, np.zeros(0, dtype=np.bool_), 1.0),
-        Rules(0.1, 1, 0.25, 1.0, 1.0),
+        Rules(0.1, 1, 2, 1.0, 1.0),
     )
     ways(state, 0.0, commands, *common)
     choose(state, 0.0, commands, np.zeros(1, dtype=np.int64), 15.0, *common)
