@@ -82,7 +82,9 @@ def test_contains_what_is_seen_over_a_whole_city():
 
 N = 5
 houses = st.lists(
-    st.tuples(st.integers(0, N * N - 1), st.integers(1, 4)), max_size=N * N, unique_by=lambda h: h[0]
+    st.tuples(st.integers(0, N * N - 1), st.integers(1, 4)),
+    max_size=N * N,
+    unique_by=lambda h: h[0],
 )
 eyes = st.tuples(st.integers(-1, N + 1), st.integers(-1, N + 1), st.integers(1, 7))
 

@@ -21,6 +21,7 @@ from staniel.guidance import (
     orbit,
     safe_loiter,
 )
+from staniel.kernels.flight import MAX_BANKS
 from staniel.kernels.lookout import roll_out
 from staniel.scenario import build_city, load_scenario
 from staniel.scenario.assemble import assemble
@@ -103,7 +104,7 @@ def test_the_same_pursuit_gives_the_same_command_and_the_rest_of_a_plan_is_kept(
     begin = (220.0, 280.0, 60.0, 1.0, 0.2, 15.0)
     first, second = lookahead(pursuit(begin)), lookahead(pursuit(begin))
     assert first == second
-    assert len(first.banks) == GuidanceConfig().lookahead.horizon
+    assert len(first.banks) == min(GuidanceConfig().lookahead.horizon, MAX_BANKS)
     assert all(abs(bank) <= Airframe().max_bank + 1e-12 for bank in first.banks)
 
 

@@ -12,17 +12,22 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from staniel.city import City
 from staniel.datatypes.command import FlyBanks
+from staniel.datatypes.equipment import Airframe
 from staniel.datatypes.risk import RiskRegion, region_arrays
+from staniel.guidance.config import LookaheadConfig
 from staniel.guidance.pursuit import NoFeasibleFlightError, Pursuit, pursuit_policy
 from staniel.kernels.flight import MAX_BANKS
 from staniel.kernels.forecast import discredit, forecast
 from staniel.kernels.lookahead import Search, plan
 from staniel.kernels.lookout import Eye, roll_out, shade
+from staniel.kernels.moves import new_moves
+from staniel.kernels.outlook import free_shares, new_outlook
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import Sightlines, new_sightlines
 
-__all__ = ["lookahead"]
+__all__ = ["lookahead", "new_search"]
 
 Floats = NDArray[np.float64]
 
@@ -39,6 +44,8 @@ class _Memory:
     """What the policy keeps from step to step."""
 
     sightlines: Sightlines
+    eye: Eye
+    search: Search
     sequence: Floats
     known: tuple[RiskRegion, ...] = ()
     regions: Regions = field(default_factory=lambda: region_arrays(()))
@@ -56,32 +63,16 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
     NoFeasibleFlightError
         Every sequence meets a building of the chart or a no-fly region.
     """
-    config, airframe, camera = pursuit.config.lookahead, pursuit.airframe, pursuit.camera
-    memory = _memory(pursuit)
-    banks = airframe.max_bank * np.linspace(-1.0, 1.0, config.banks)
-    steps = config.horizon * _SAMPLES
-    eye = Eye(camera.mounting, camera.half_aperture, camera.range)
+    config, airframe, memory = pursuit.config.lookahead, pursuit.airframe, _memory(pursuit)
     cloud = _thinned(pursuit, memory)
-    places = forecast(pursuit.chart.walls, cloud, steps, _STEP)
+    places = forecast(pursuit.chart.walls, cloud, config.horizon * _SAMPLES, _STEP)
     weights = np.full(places.shape[:2], 1.0 / config.particles)
-    _share(pursuit, eye, places, weights)
-    search = Search(
-        banks,
-        config.horizon,
-        _SAMPLES,
-        _STEP,
-        airframe.roll_gain,
-        math.radians(airframe.max_roll_rate_deg),
-        config.width,
-        config.discount,
-        config.effort,
-        config.polish,
-    )
+    _share(pursuit, memory.eye, places, weights)
     sequence, _ = plan(
         pursuit.chart.walls,
         memory.sightlines,
-        eye,
-        search,
+        memory.eye,
+        memory.search,
         memory.regions,
         memory.rates,
         np.array(pursuit.pose),
@@ -98,18 +89,42 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
 
 def _memory(pursuit: Pursuit) -> _Memory:
     """The policy's own, with the regions that the agent knows of by now."""
-    altitude = pursuit.airframe.altitude
     memory = pursuit.memory.get("lookahead")
     if not isinstance(memory, _Memory):
-        lines = new_sightlines(altitude, pursuit.camera.target_height)
-        sequence = np.zeros(pursuit.config.lookahead.horizon)
-        memory = pursuit.memory["lookahead"] = _Memory(lines, sequence)
+        camera, config = pursuit.camera, pursuit.config.lookahead
+        lines = new_sightlines(pursuit.airframe.altitude, camera.target_height)
+        eye = Eye(camera.mounting, camera.half_aperture, camera.range)
+        search = new_search(pursuit.chart, pursuit.airframe, eye, camera.target_height, config)
+        memory = _Memory(lines, eye, search, np.zeros(config.horizon))
+        pursuit.memory["lookahead"] = memory
     if memory.known != pursuit.dangers.regions:
         memory.known, price = pursuit.dangers.regions, pursuit.config.lookahead.exposure
         memory.regions = region_arrays(memory.known)
         rates = [math.inf if one.rate is None else price * one.rate for one in memory.known]
         memory.rates = np.array(rates, dtype=np.float64)
     return memory
+
+
+def new_search(
+    chart: City, airframe: Airframe, eye: Eye, target_height: float, config: LookaheadConfig
+) -> Search:
+    """What is searched, with its tables: some tenths of a second of work, once a flight."""
+    banks = airframe.max_bank * np.linspace(-1.0, 1.0, config.banks)
+    speed, roll = airframe.speed, (airframe.roll_gain, math.radians(airframe.max_roll_rate_deg))
+    free = free_shares(chart.walls, *chart.size, airframe.altitude, target_height)
+    below = airframe.altitude - target_height
+    return Search(
+        new_moves(banks, speed, *roll, _STEP, _SAMPLES, eye.mount),
+        config.horizon,
+        _SAMPLES,
+        _STEP,
+        *roll,
+        config.width,
+        config.discount,
+        config.effort,
+        config.polish,
+        new_outlook(eye, free, below, speed, banks, *roll, _STEP, _SAMPLES, config.discount),
+    )
 
 
 def _left_over(memory: _Memory, time: float) -> Floats:

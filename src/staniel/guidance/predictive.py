@@ -114,7 +114,7 @@ class Predictive:
         self._escape, self._heading = choice.escape, None
         if guard and row[0] == LINE:
             self._heading = math.atan2(row[6] - row[4], row[5] - row[3])
-        drift.expect(choice.there, choice.climb)
+        drift.expect(choice.there.tolist(), choice.climb)
         return decode(row) if guard else command, guard
 
     def _choose(

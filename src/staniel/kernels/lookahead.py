@@ -13,7 +13,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.footprint import BODY
-from staniel.kernels.lookout import Eye, danger, glide, no_regions, strikes, watch
+from staniel.kernels.lookout import (
+    Eye,
+    axis_of,
+    danger,
+    flies_low,
+    glide,
+    no_regions,
+    strikes,
+    watch,
+)
+from staniel.kernels.moves import Moves, entry_of, new_moves
+from staniel.kernels.outlook import Outlook, free_shares, new_outlook, outlook
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import Sightlines, new_sightlines, slot_of
 from staniel.kernels.walls import Walls, warm_walls
@@ -24,16 +35,15 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _TWO_PI = 2.0 * math.pi
-_NEAR = 30.0  # no nearer need a flight be to what it watches [m]
-_PULL = 0.02  # seconds of sight that each metre beyond is held to cost, when flights are compared
-_SAME_PLACE, _SAME_HEADING, _SAME_BANK = 8.0, 0.35, 0.2  # within these two states are one
+_TOGETHER = 6.0  # places nearer than that are one [m]
+_SAME_PLACE, _SAME_HEADING, _SAME_BANK = 12.0, 0.5, 0.2  # within these two states are one
 
 
 class Search(NamedTuple):
     """What is searched, and what counts."""
 
-    banks: Floats
-    """(k,) what may be held [rad]."""
+    moves: Moves
+    """What may be held, and what comes of it."""
     holds: int
     """How many are held one after the other."""
     samples: int
@@ -52,6 +62,8 @@ class Search(NamedTuple):
     """Seconds of sight that a second at a bank of one radian costs, by its square."""
     polish: int
     """How often the best sequences are gone through for small changes."""
+    beyond: Outlook
+    """What a flight's end is worth."""
 
 
 class Scene(NamedTuple):
@@ -66,9 +78,9 @@ class Scene(NamedTuple):
     slots: Indices
     """(t + 1, m) of the places in `memory`."""
     places: Floats
-    """(t + 1, m, 2) where the target may be at each instant [m]."""
+    """(t + 1, m, 2) where the target may be at each instant, `_TOGETHER` apart [m]."""
     weights: Floats
-    """(t + 1, m)"""
+    """(t + 1, m), those of 0 last."""
     centers: Floats
     """(t + 1, 2) middle of the places [m]."""
     worths: Floats
@@ -98,32 +110,6 @@ def _entry(table: Indices, keys: Indices, key: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _hold(
-    scene: Scene, first: int, row: Floats, wanted: float
-) -> tuple[float, float, float, float, float]:
-    """A row after one more hold, from instant `first` on; worth -inf where it may not be flown."""
-    x, y, heading, bank, worth = row[0], row[1], row[2], row[3], row[4]
-    search, speed, altitude = scene.search, scene.start[5], scene.memory.altitude
-    for s in range(search.samples):
-        t = first + s + 1
-        from_x, from_y = x, y
-        x, y, heading, bank = glide(
-            x, y, heading, bank, speed, wanted, search.roll_gain, search.roll_rate, search.step
-        )
-        if strikes(scene.walls, from_x, from_y, x, y, altitude):
-            return x, y, heading, bank, -math.inf
-        seen = watch(
-            scene.memory, scene.walls, scene.eye, scene.slots[t], scene.places[t],
-            scene.weights[t], x, y, heading, bank,
-        )  # fmt: skip
-        cost = search.effort * bank * bank
-        if scene.rates.size > 0:
-            cost += danger(scene.regions, scene.rates, x, y, altitude)
-        worth += scene.worths[t] * (seen - cost) * search.step
-    return x, y, heading, bank, worth
-
-
-@njit(cache=True, error_model="numpy")
 def _begin(start: Floats, rows: Floats) -> None:
     """Fill the first row from a pose."""
     rows[0, 0], rows[0, 1], rows[0, 2] = start[0], start[1], start[3]
@@ -131,13 +117,12 @@ def _begin(start: Floats, rows: Floats) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def _rank(scene: Scene, row: Floats, t: int) -> float:
-    """Worth of a row at instant t, less what its distance costs.
-
-    Flights far from where the target may be see nothing yet, all alike: the nearer is preferred.
-    """
-    away = math.hypot(row[0] - scene.centers[t, 0], row[1] - scene.centers[t, 1])
-    return float(row[4] - scene.worths[t] * (_PULL * max(0.0, away - _NEAR)))
+def _rank(beyond: Outlook, center: Floats, later: float, row: Floats) -> float:
+    """Worth of a row, and of what may be hoped for from there on, which counts for `later`."""
+    east, north = center[0] - row[0], center[1] - row[1]
+    c, s = math.cos(row[2]), math.sin(row[2])
+    hoped = outlook(beyond, c * east + s * north, c * north - s * east, row[3])
+    return float(row[4] + later * hoped)
 
 
 @njit(cache=True, error_model="numpy")
@@ -146,14 +131,33 @@ def _flown(scene: Scene, sequence: Floats, rows: Floats, level: int) -> float:
 
     ``rows[:level + 1]`` are the states before each bank; those after are filled in.
     """
-    samples = scene.search.samples
+    # A call that hands the whole scene on costs more than a look: hence this and `_grown` are long.
+    search, walls, memory, eye = scene.search, scene.walls, scene.memory, scene.eye
+    samples, step, altitude, speed = search.samples, search.step, memory.altitude, scene.start[5]
+    gain, rate, worths = search.roll_gain, search.roll_rate, scene.worths
+    low, dangerous = flies_low(walls, altitude), scene.rates.size > 0
     for k in range(level, sequence.size):
-        x, y, heading, bank, worth = _hold(scene, k * samples, rows[k], sequence[k])
-        if worth == -math.inf:
-            return -math.inf
+        x, y, heading, bank = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
+        worth = rows[k, 4]
+        for t in range(k * samples + 1, (k + 1) * samples + 1):
+            from_x, from_y = x, y
+            x, y, heading, bank = glide(x, y, heading, bank, speed, sequence[k], gain, rate, step)
+            if low and strikes(walls, from_x, from_y, x, y, altitude):
+                return -math.inf
+            axis = axis_of(heading, bank, eye.mount)
+            seen = watch(
+                memory, walls, eye, scene.slots[t], scene.places[t], scene.weights[t], x, y, axis
+            )
+            seen -= search.effort * bank * bank
+            if dangerous:
+                seen -= danger(scene.regions, scene.rates, x, y, altitude)
+            worth += worths[t] * seen * step
         rows[k + 1, 0], rows[k + 1, 1], rows[k + 1, 2] = x, y, heading
         rows[k + 1, 3], rows[k + 1, 4] = bank, worth
-    return _rank(scene, rows[sequence.size], sequence.size * samples)
+        if worth == -math.inf:
+            return -math.inf
+    t = sequence.size * samples
+    return _rank(search.beyond, scene.centers[t], worths[t], rows[sequence.size])
 
 
 @njit(cache=True, error_model="numpy")
@@ -161,7 +165,8 @@ def _polished(scene: Scene, sequence: Floats) -> float:
     """Change one bank after the other a little, in place, where it pays; the rank in the end."""
     search, rows = scene.search, np.zeros((sequence.size + 1, 5))
     _begin(scene.start, rows)
-    limit, size = search.banks[-1], search.banks[1] - search.banks[0]
+    banks = search.moves.banks
+    limit, size = banks[-1], banks[1] - banks[0]
     best = _flown(scene, sequence, rows, 0)
     if best == -math.inf:
         return best  # The rows after its end were never filled in.
@@ -195,24 +200,57 @@ def _grown(
 
     `table` and `keys` are scratch: a hash table of the states.
     """
+    search, walls, memory, eye = scene.search, scene.walls, scene.memory, scene.eye
+    samples, step, altitude = search.samples, search.step, memory.altitude
+    low, dangerous = flies_low(walls, altitude), scene.rates.size > 0
+    moves, worths = search.moves, scene.worths
+    end = np.empty(moves.ends.shape[3])
     table[:] = -1
-    count, banks = 0, scene.search.banks
+    count = 0
     for i in range(rows.shape[0]):
-        for k in range(banks.size):
-            x, y, heading, bank, worth = _hold(scene, first, rows[i], banks[k])
+        start_x, start_y, heading = rows[i, 0], rows[i, 1], rows[i, 2]
+        cosine, sine = math.cos(heading), math.sin(heading)
+        entry, share = entry_of(moves, rows[i, 3])
+        for k in range(moves.banks.size):
+            x, y, worth = start_x, start_y, rows[i, 4]
+            for s in range(samples):
+                t, from_x, from_y = first + s + 1, x, y
+                for c in range(end.size):
+                    before = moves.ends[entry, k, s, c]
+                    end[c] = before + share * (moves.ends[entry + 1, k, s, c] - before)
+                ahead, left, turned_c, turned_s = end[0], end[1], end[3], end[4]
+                bank, aside, up = end[5], end[6], end[7]
+                x = start_x + cosine * ahead - sine * left
+                y = start_y + sine * ahead + cosine * left
+                if low and strikes(walls, from_x, from_y, x, y, altitude):
+                    worth = -math.inf
+                    break
+                east = cosine * turned_c - sine * turned_s
+                north = sine * turned_c + cosine * turned_s
+                axis = (
+                    east * moves.forward - north * aside, north * moves.forward + east * aside, up
+                )  # fmt: skip
+                seen = watch(
+                    memory, walls, eye, scene.slots[t], scene.places[t], scene.weights[t],
+                    x, y, axis,
+                )  # fmt: skip
+                seen -= search.effort * bank * bank
+                if dangerous:
+                    seen -= danger(scene.regions, scene.rates, x, y, altitude)
+                worth += worths[t] * seen * step
             if worth == -math.inf:
                 continue
-            key = _key(x, y, heading, bank)
+            key = _key(x, y, heading + end[2], end[5])
             at = _entry(table, keys, key)
-            c = table[at]
-            if c < 0:
-                c, table[at], keys[at] = count, count, key
+            g = table[at]
+            if g < 0:
+                g, table[at], keys[at] = count, count, key
                 count += 1
-            elif grown[c, 4] >= worth:
+            elif grown[g, 4] >= worth:
                 continue
-            grown[c, 0], grown[c, 1], grown[c, 2] = x, y, heading
-            grown[c, 3], grown[c, 4] = bank, worth
-            origin[c, 0], origin[c, 1] = i, k
+            grown[g, 0], grown[g, 1], grown[g, 2] = x, y, heading + end[2]
+            grown[g, 3], grown[g, 4] = end[5], worth
+            origin[g, 0], origin[g, 1] = i, k
     return count
 
 
@@ -220,7 +258,8 @@ def _grown(
 def _beam(scene: Scene) -> Floats:
     """The best sequence of the search's banks that a beam finds; empty where none may be flown."""
     search = scene.search
-    most, size = search.width * search.banks.size, 64
+    banks = search.moves.banks
+    most, size = search.width * banks.size, 64
     while size < 3 * most:
         size *= 2
     table, keys = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
@@ -234,9 +273,10 @@ def _beam(scene: Scene) -> Floats:
         count = _grown(scene, first, rows, table, keys, grown, origin)
         if count == 0:
             return np.zeros(0)
-        ranks = np.empty(count)
+        ranks, t = np.empty(count), first + search.samples
+        center, later = scene.centers[t], scene.worths[t]
         for c in range(count):
-            ranks[c] = -_rank(scene, grown[c], first + search.samples)
+            ranks[c] = -_rank(search.beyond, center, later, grown[c])
         order = np.argsort(ranks, kind="mergesort")[: search.width]
         rows = np.empty((order.size, 5))
         for q in range(order.size):
@@ -246,8 +286,30 @@ def _beam(scene: Scene) -> Floats:
                 rows[q, e] = grown[c, e]
     best, q = np.empty(search.holds), 0
     for level in range(search.holds - 1, -1, -1):
-        best[level], q = search.banks[choices[level, q]], parents[level, q]
+        best[level], q = banks[choices[level, q]], parents[level, q]
     return best
+
+
+@njit(cache=True, error_model="numpy")
+def _merged(memory: Sightlines, places: Floats, weights: Floats) -> tuple[Indices, Floats, Floats]:
+    """Slots, places and weights: of places near to each other the first stands for all."""
+    instants, m = weights.shape
+    slots = np.zeros((instants, m), dtype=np.int64)
+    kept, sums = np.zeros((instants, m, 2)), np.zeros((instants, m))
+    for t in range(instants):
+        count = 0
+        for j in range(m):
+            x, y, weight = places[t, j, 0], places[t, j, 1], weights[t, j]
+            if weight == 0.0:
+                continue
+            at = 0
+            while at < count and math.hypot(kept[t, at, 0] - x, kept[t, at, 1] - y) > _TOGETHER:
+                at += 1
+            if at == count:
+                kept[t, at, 0], kept[t, at, 1] = x, y
+                slots[t, at], count = slot_of(memory, x, y), count + 1
+            sums[t, at] += weight
+    return slots, kept, sums
 
 
 @njit(cache=True, error_model="numpy")
@@ -291,17 +353,15 @@ def plan(
         Empty where every sequence ends in a building or a no-fly region.
     worth : float [s]
         Expected discounted seconds of sight, less exposure and effort,
-        :math:`\sum_t \gamma^{t} (\sum_j w_{tj} [j\ seen] - cost_t)\,\Delta t`, and less what the
-        distance at the end costs.
+        :math:`\sum_t \gamma^{t} (\sum_j w_{tj} [j\ seen] - cost_t)\,\Delta t`, and the outlook at
+        the end.
     """
-    instants, m = places.shape[0], places.shape[1]
-    slots = np.empty((instants, m), dtype=np.int64)
+    instants = places.shape[0]
     centers, worths = np.empty((instants, 2)), np.empty(instants)
     for t in range(instants):
-        for j in range(m):
-            slots[t, j] = slot_of(memory, places[t, j, 0], places[t, j, 1])
         centers[t, 0], centers[t, 1] = places[t, :, 0].mean(), places[t, :, 1].mean()
         worths[t] = search.discount ** (t * search.step)
+    slots, places, weights = _merged(memory, places, weights)
     scene = Scene(
         walls, memory, eye, search, regions, rates, slots, places, weights, centers, worths, start
     )
@@ -316,9 +376,12 @@ def plan(
 
 def warm() -> None:
     """Compile, or load from the disk cache, what a flight calls."""
-    memory, eye = new_sightlines(50.0, 1.0), Eye(BODY, 1.0, 100.0)
-    search = Search(np.array([-0.5, 0.5]), 1, 2, 0.5, 3.0, 1.0, 4, 0.95, 0.0, 1)
+    memory, eye, walls = new_sightlines(50.0, 1.0), Eye(BODY, 1.0, 100.0), warm_walls()
+    banks, free = np.array([-0.5, 0.5]), free_shares(walls, 1.0, 1.0, 50.0, 1.0)
+    moves = new_moves(banks, 15.0, 3.0, 1.0, 0.5, 2, BODY)
+    beyond = new_outlook(eye, free, 50.0, 15.0, banks, 3.0, 1.0, 0.5, 2, 0.95)
+    search = Search(moves, 1, 2, 0.5, 3.0, 1.0, 4, 0.95, 0.0, 1, beyond)
     start = np.array([0.0, 0.0, 50.0, 0.0, 0.0, 15.0])
     places, weights = np.zeros((3, 1, 2)), np.ones((3, 1))
     regions, rates = no_regions()
-    plan(warm_walls(), memory, eye, search, regions, rates, start, places, weights, np.zeros(1))
+    plan(walls, memory, eye, search, regions, rates, start, places, weights, np.zeros(1))

@@ -13,11 +13,24 @@ from numpy.typing import NDArray
 
 from staniel.kernels.flight import lagged
 from staniel.kernels.footprint import BODY, Mount, in_cone
+from staniel.kernels.pieces import woven
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import Sightlines, new_sightlines, sees, slot_of
 from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
-__all__ = ["Eye", "danger", "glide", "no_regions", "roll_out", "shade", "strikes", "warm", "watch"]
+__all__ = [
+    "Eye",
+    "axis_of",
+    "danger",
+    "flies_low",
+    "glide",
+    "no_regions",
+    "roll_out",
+    "shade",
+    "strikes",
+    "warm",
+    "watch",
+]
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -115,7 +128,7 @@ def roll_out(
 
 
 @njit(cache=True, error_model="numpy")
-def _axis(heading: float, bank: float, mount: Mount) -> tuple[float, float, float]:
+def axis_of(heading: float, bank: float, mount: Mount) -> tuple[float, float, float]:
     """Along which a mounted camera looks, as `camera_axes`; a gimbal looks straight down."""
     forward, left, up, rolls, _, limit = mount
     if limit >= 0.0:
@@ -126,7 +139,7 @@ def _axis(heading: float, bank: float, mount: Mount) -> tuple[float, float, floa
     return east * forward - north * aside, north * forward + east * aside, cosine * up - sine * left
 
 
-@njit(cache=True, error_model="numpy")
+@woven
 def watch(
     memory: Sightlines,
     walls: Walls,
@@ -136,10 +149,9 @@ def watch(
     weights: Floats,
     x: float,
     y: float,
-    heading: float,
-    bank: float,
+    axis: tuple[float, float, float],
 ) -> float:
-    """Weight of the places in the cone, in range and in free sight from a pose.
+    """Weight of the places in the cone, in range and in free sight of a camera.
 
     Parameters
     ----------
@@ -151,19 +163,26 @@ def watch(
         Of the places in `memory`.
     places : (m, 2) float array [m]
     weights : (m,) float array
-    x, y, heading, bank : float
+        After the first that is 0 all are.
+    x, y : float [m]
+    axis : (float, float, float)
+        Along which it looks.
     """
-    ax, ay, az = _axis(heading, bank, eye.mount)
-    cosine = math.cos(eye.half_aperture)
+    ax, ay, az = axis
     dz = memory.target_height - memory.altitude
+    down, height_2, reach_2 = az * dz, dz * dz, eye.reach * eye.reach
+    cosine_2 = math.cos(eye.half_aperture) ** 2
     seen = 0.0
     for j in range(weights.size):
-        if weights[j] > 0.0:
-            dx, dy = places[j, 0] - x, places[j, 1] - y
-            if in_cone(dx, dy, dz, ax, ay, az, cosine, eye.reach) and sees(
-                memory, walls, slots[j], x, y
-            ):
-                seen += weights[j]
+        if weights[j] == 0.0:
+            break
+        dx, dy = places[j, 0] - x, places[j, 1] - y
+        slant_2, along = dx * dx + dy * dy + height_2, dx * ax + dy * ay + down
+        # As `in_cone`, without its root: this is where a search spends its time.
+        if along <= 0.0 or along * along < cosine_2 * slant_2 or slant_2 > reach_2:
+            continue
+        if sees(memory, walls, slots[j], x, y):
+            seen += weights[j]
     return seen
 
 
@@ -195,7 +214,7 @@ def shade(
     cosine = math.cos(eye.half_aperture)
     for t in range(weights.shape[0]):
         x, y, z = poses[t, 0], poses[t, 1], poses[t, 2]
-        ax, ay, az = _axis(poses[t, 3], poses[t, 4], eye.mount)
+        ax, ay, az = axis_of(poses[t, 3], poses[t, 4], eye.mount)
         for j in range(weights.shape[1]):
             px, py = places[t, j, 0], places[t, j, 1]
             if in_cone(px - x, py - y, height - z, ax, ay, az, cosine, eye.reach) and line_of_sight(
@@ -225,11 +244,15 @@ def danger(regions: Regions, rates: Floats, x: float, y: float, z: float) -> flo
 
 
 @njit(cache=True, error_model="numpy")
+def flies_low(walls: Walls, z: float) -> bool:
+    """Whether buildings can be in the way at a height at all."""
+    return bool(z - _BELOW < walls.tallest)
+
+
+@njit(cache=True, error_model="numpy")
 def strikes(walls: Walls, x0: float, y0: float, x1: float, y1: float, z: float) -> bool:
     """Whether a straight piece of flight comes too near to a building of the chart."""
     low = z - _BELOW
-    if low >= walls.tallest:
-        return False
     length = math.hypot(x1 - x0, y1 - y0)
     aside_x, aside_y = _SIDE * (y0 - y1) / length, _SIDE * (x1 - x0) / length
     for side in (-1.0, 0.0, 1.0):
@@ -248,4 +271,4 @@ def warm() -> None:
     places, weights = np.zeros((3, 1, 2)), np.ones((3, 1))
     shade(walls, eye, poses, places, weights, 1.0, 0.9)
     slots = np.array([slot_of(memory, 0.0, 0.0)])
-    watch(memory, walls, eye, slots, places[0], weights[0], 0.0, 0.0, 0.0, 0.0)
+    watch(memory, walls, eye, slots, places[0], weights[0], 0.0, 0.0, (0.0, 0.0, -1.0))

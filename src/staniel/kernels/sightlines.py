@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.pieces import bare, woven
 from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
 __all__ = ["AIR", "GROUND", "SLOTS", "Sightlines", "new_sightlines", "sees", "slot_of", "warm"]
@@ -80,23 +81,33 @@ def slot_of(memory: Sightlines, x: float, y: float) -> int:
     return slot
 
 
-@njit(cache=True, error_model="numpy")
-def sees(memory: Sightlines, walls: Walls, slot: int, x: float, y: float) -> bool:
-    """Whether the slot's place is in free sight from around (x, y) at the flight height."""
+@bare
+def _looked_up(memory: Sightlines, walls: Walls, slot: int, x: float, y: float) -> bool:
+    """As `sees`, of a line that nobody asked for before, or that is not kept."""
     px, py = memory.places[slot, 0], memory.places[slot, 1]
     low, high = memory.target_height, memory.altitude
     i = math.floor((x - px) * (1.0 / AIR))
     j = math.floor((y - py) * (1.0 / AIR))
     if not (-_HALF <= i < _HALF and -_HALF <= j < _HALF):
         return bool(line_of_sight(walls, px, py, low, x, y, high))
-    cell = (i + _HALF) * _WIDE + j + _HALF
-    known = memory.lines[slot, cell]
+    middle_x, middle_y = px + (i + 0.5) * AIR, py + (j + 0.5) * AIR
+    free = line_of_sight(walls, px, py, low, middle_x, middle_y, high)
+    memory.lines[slot, (i + _HALF) * _WIDE + j + _HALF] = _FREE if free else _HIDDEN
+    return bool(free)
+
+
+@woven
+def sees(memory: Sightlines, walls: Walls, slot: int, x: float, y: float) -> bool:
+    """Whether the slot's place is in free sight from around (x, y) at the flight height."""
+    # Truncation rounds the way that floor does where what it is given is positive.
+    i = int((x - memory.places[slot, 0]) * (1.0 / AIR) + (_HALF + 1.0)) - 1
+    j = int((y - memory.places[slot, 1]) * (1.0 / AIR) + (_HALF + 1.0)) - 1
+    known = _UNKNOWN
+    if 0 <= i < _WIDE and 0 <= j < _WIDE:
+        known = int(memory.lines[slot, i * _WIDE + j])
     if known == _UNKNOWN:
-        middle_x, middle_y = px + (i + 0.5) * AIR, py + (j + 0.5) * AIR
-        free = line_of_sight(walls, px, py, low, middle_x, middle_y, high)
-        known = np.uint8(_FREE if free else _HIDDEN)
-        memory.lines[slot, cell] = known
-    return bool(known == _FREE)
+        return _looked_up(memory, walls, slot, x, y)
+    return known == _FREE
 
 
 def warm() -> None:

@@ -133,5 +133,7 @@ def kernels_of(scenario: Scenario) -> list[str]:
         "replay": scenario.vehicles.kind == "replay",
     }
     searched = scenario.guidance.pursuit == "lookahead"
-    pursuit = ["forecast", "lookahead", "lookout", "sightlines"] if searched else []
+    pursuit = (
+        ["forecast", "lookahead", "lookout", "moves", "outlook", "sightlines"] if searched else []
+    )
     return [*(name for name, used in uses.items() if used), *pursuit]

@@ -1,0 +1,88 @@
+"""What holding a bank for a while does to a flight, worked out beforehand for every bank before it.
+
+Where a flight begins, and its heading, only shift and turn what comes of it. On its bank that
+depends smoothly, so a table over banks, linear between its entries, stands for the dynamics where a
+search asks for the same few moves thousands of times.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from staniel.kernels.footprint import BODY, Mount
+from staniel.kernels.lookout import axis_of, glide
+
+__all__ = ["Moves", "entry_of", "new_moves", "warm"]
+
+Floats = NDArray[np.float64]
+
+_BINS = 36  # of the table, evenly from limit to limit: two degrees or so
+
+
+class Moves(NamedTuple):
+    """The table."""
+
+    banks: Floats
+    """(k,) what may be held, evenly from limit to limit [rad]."""
+    ends: Floats
+    """(_BINS, k, samples, 8) after each sample, in the frame of the start: the way ahead and to the
+    left, heading, cosine and sine of it, bank, and the camera's axis to the left and up."""
+    forward: float
+    """The camera's axis ahead, which no bank changes."""
+
+
+@njit(cache=True, error_model="numpy")
+def new_moves(
+    banks: Floats,
+    speed: float,
+    roll_gain: float,
+    roll_rate: float,
+    step: float,
+    samples: int,
+    mount: Mount,
+) -> Moves:
+    """Fly every bank from every bank.
+
+    Parameters
+    ----------
+    banks : (k,) float array [rad]
+    speed : float [m/s]
+    roll_gain, roll_rate : float [1/s, rad/s]
+    step : float [s]
+        Between two samples.
+    samples : int
+        While one bank is held.
+    mount : Mount
+        Of the camera.
+    """
+    ends = np.empty((_BINS, banks.size, samples, 8))
+    for b in range(_BINS):
+        for k in range(banks.size):
+            x, y, heading = 0.0, 0.0, 0.0
+            bank = banks[-1] * (2.0 * b / (_BINS - 1) - 1.0)
+            for s in range(samples):
+                x, y, heading, bank = glide(
+                    x, y, heading, bank, speed, banks[k], roll_gain, roll_rate, step
+                )
+                end = ends[b, k, s]
+                end[0], end[1], end[2] = x, y, heading
+                end[3], end[4], end[5] = math.cos(heading), math.sin(heading), bank
+                _, end[6], end[7] = axis_of(0.0, bank, mount)
+    return Moves(banks, ends, axis_of(0.0, 0.0, mount)[0])
+
+
+@njit(cache=True, error_model="numpy")
+def entry_of(moves: Moves, bank: float) -> tuple[int, float]:
+    """Entry of `Moves.ends` below a bank, and the share of the way to the next."""
+    at = (bank / moves.banks[-1] + 1.0) * 0.5 * (_BINS - 1)
+    at = min(max(at, 0.0), _BINS - 1.000001)
+    return int(at), at - int(at)
+
+
+def warm() -> None:
+    """Compile, or load from the disk cache, what a flight calls."""
+    moves = new_moves(np.array([-0.5, 0.5]), 15.0, 3.0, 1.0, 0.5, 2, BODY)
+    entry_of(moves, 0.0)
