@@ -8,6 +8,7 @@ has to beat. What a partner on the same target will see by its last plan heard c
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ from staniel.kernels.forecast import discredit, forecast
 from staniel.kernels.lookahead import Search, plan
 from staniel.kernels.lookout import Eye, roll_out, shade
 from staniel.kernels.moves import new_moves
-from staniel.kernels.outlook import free_shares, new_outlook
+from staniel.kernels.outlook import Outlook, free_shares, new_outlook
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import Sightlines, new_sightlines
 
@@ -123,8 +124,23 @@ def new_search(
         config.discount,
         config.effort,
         config.polish,
-        new_outlook(eye, free, below, speed, banks, *roll, _STEP, _SAMPLES, config.discount),
+        _outlook(eye, tuple(free), below, speed, tuple(banks), roll, config.discount),
     )
+
+
+@lru_cache(maxsize=16)
+def _outlook(
+    eye: Eye,
+    free: tuple[float, ...],
+    below: float,
+    speed: float,
+    banks: tuple[float, ...],
+    roll: tuple[float, float],
+    discount: float,
+) -> Outlook:
+    """As `new_outlook`; aircraft that are alike share one. Nobody writes into it."""
+    shares, held = np.array(free), np.array(banks)
+    return new_outlook(eye, shares, below, speed, held, *roll, _STEP, _SAMPLES, discount)
 
 
 def _left_over(memory: _Memory, time: float) -> Floats:
