@@ -126,7 +126,7 @@ def fly(number: int, policy: str, minutes: float) -> Outcome:
     layer = np.array([airframe.altitude for airframe in scenario.airframes])
     return Outcome(
         number,
-        f"loss {scenario.radio.loss:g}, layers {scenario.guidance.layer_spacing:g} m",
+        f"loss {scenario.radio.loss:g}, layers {scenario.guidance.layers:g} m",
         count,
         strikes,
         float(gaps.min()),

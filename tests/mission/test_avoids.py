@@ -67,7 +67,8 @@ def test_below_the_roofs_only_who_avoids_may_fly():
 
 
 def test_they_begin_clear_of_what_they_do_not_fly_over():
-    scenario = load_scenario("downtown", **(LOW | {"aircraft.altitude": 20.0, "aircraft.count": 6}))
+    six = {"aircraft.altitude": 20.0, "aircraft.count": 6, "guidance.layer_spacing": 0.0}
+    scenario = load_scenario("downtown", **(LOW | six))
     city = build_city(scenario.city, scenario.seed)
     start = assemble(scenario, city).start.aircraft
     tall = [o for o, h in zip(city.outlines, city.heights, strict=True) if h > 20.0]
@@ -81,6 +82,12 @@ def test_they_begin_clear_of_what_they_do_not_fly_over():
 def test_layers_are_altitudes():
     scenario = load_scenario("downtown", **{"guidance.layer_spacing": 15.0})
     assert [a.altitude for a in scenario.airframes] == [80.0, 95.0, 110.0, 125.0]
+    alone = [a.altitude for a in load_scenario("downtown").airframes]
+    assert alone == [80.0] * 4
+    avoiding = load_scenario("downtown", **{"guidance.avoidance": "predictive"})
+    assert avoiding.airframes == scenario.airframes
+    level = {"guidance.avoidance": "predictive", "guidance.layer_spacing": 0.0}
+    assert [a.altitude for a in load_scenario("downtown", **level).airframes] == alone
     start = assemble(scenario, build_city(scenario.city, 0)).start
     assert start.aircraft[:, 2].tolist() == [80.0, 95.0, 110.0, 125.0]
 

@@ -60,8 +60,12 @@ class GuidanceConfig(Config):
     avoidance: Literal["none", "predictive", "saunders"] = Field(
         "none", description="of buildings, aircraft and no-fly regions"
     )
-    layer_spacing: float = Field(
-        0.0, ge=0.0, le=1000.0, description="each aircraft flies so much above the one before [m]"
+    layer_spacing: float | None = Field(
+        None,
+        ge=0.0,
+        le=1000.0,
+        description="each aircraft flies so much above the one before; "
+        "not set: 15 with avoidance, else 0 [m]",
     )
     clearance: float = Field(6.0, gt=0.0, le=100.0, description="kept from walls [m]")
     separation: float = Field(10.0, gt=0.0, le=500.0, description="kept from other aircraft [m]")
@@ -83,6 +87,13 @@ class GuidanceConfig(Config):
             if not shape.is_valid or shape.area <= 0.0:
                 raise ValueError("fence is not a simple outline with an area")
         return self
+
+    @property
+    def layers(self) -> float:
+        """How much each aircraft flies above the one before [m]."""
+        if self.layer_spacing is not None:
+            return self.layer_spacing
+        return 0.0 if self.avoidance == "none" else 15.0
 
     @property
     def approach(self) -> float:

@@ -200,7 +200,7 @@ class Scenario(Config):
                 for number, group in enumerate(self.groups)
                 for airframe in (self._kind(number, "aircraft", Airframe),) * group.count
             )
-        spacing = self.guidance.layer_spacing
+        spacing = self.guidance.layers
         if spacing == 0.0:
             return team
         return tuple(
