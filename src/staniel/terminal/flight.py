@@ -10,16 +10,14 @@ import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
-__all__ = ["Reporter"]
+from staniel.terminal.live import REFRESH, LiveBar
 
-REFRESH = 0.2
-"""Shortest time between two redraws of the bar [s]; a redraw costs about a millisecond."""
+__all__ = ["Reporter"]
 
 PATIENCE = 1.5
 """Kernels that take longer to be ready are being compiled, not loaded [s]."""
@@ -46,7 +44,7 @@ class Flown(Protocol):
     def metrics(self) -> Mapping[str, Any]: ...
 
 
-class Reporter:
+class Reporter(LiveBar):
     """Listens to a flight's events and shows them.
 
     Parameters
@@ -58,28 +56,13 @@ class Reporter:
     """
 
     def __init__(self, *, quiet: bool = False, console: Console | None = None) -> None:
-        self.console = console or Console(stderr=True, quiet=quiet, highlight=False)
-        self._live = self.console.is_terminal and not quiet
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[text]}"),
-            console=self.console,
-            auto_refresh=False,
-            transient=True,
-        )
+        super().__init__(quiet=quiet, console=console)
         note = "compiling the kernels: only the first time, about 30 s"
         self._note = threading.Timer(PATIENCE, self._say, [note])
         self._note.daemon = True
-        self._task: TaskID | None = None
         self._noting = False
         self._next = 0.0
         self._next_line = 0.25
-
-    def __enter__(self) -> Self:
-        if self._live:
-            self._progress.start()
-        return self
 
     def __exit__(
         self,
@@ -88,8 +71,7 @@ class Reporter:
         traceback: TracebackType | None,
     ) -> None:
         self._note.cancel()
-        if self._live:
-            self._progress.stop()
+        super().__exit__(kind, error, traceback)
 
     def on_event(self, event: str, **info: Any) -> None:  # noqa: ANN401
         """Show one event of a flight: compiling, tick, rendering or stopped."""
@@ -157,18 +139,6 @@ class Reporter:
         if not self._live and time >= self._next_line * duration:
             self._next_line = math.floor(4.0 * time / duration + 1.0) / 4.0
             self._say(f"flying: {text}")
-
-    def _show(self, what: str, done: float, total: float, text: str) -> None:
-        if not self._live:
-            return
-        if self._task is None:
-            self._task = self._progress.add_task(what, text="")
-        self._progress.update(
-            self._task, description=what, completed=done, total=total, text=text, refresh=True
-        )
-
-    def _say(self, text: str) -> None:
-        self.console.print(text, markup=False, soft_wrap=True)
 
     def _list_files(self, folder: Path) -> None:
         self._say(f"\nfiles in {folder}")

@@ -7,22 +7,21 @@ now and then.
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 from rich.text import Text
 
+from staniel.terminal.live import REFRESH, LiveBar
+
 __all__ = ["StudyReporter", "print_summary"]
 
-_REFRESH = 0.2  # shortest time between two redraws [s]
 _LINE = 30.0  # between two lines where there is no bar [s]
 _MARKS = {"supported": "[green]✓ supported[/]", "contradicted": "[red]✗ contradicted[/]"}
 
 
-class StudyReporter:
+class StudyReporter(LiveBar):
     """Listens to a study's events and shows them.
 
     Parameters
@@ -36,43 +35,19 @@ class StudyReporter:
     """
 
     def __init__(self, name: str, *, quiet: bool = False, console: Console | None = None) -> None:
-        self.console = console or Console(stderr=True, quiet=quiet, highlight=False)
+        super().__init__(quiet=quiet, console=console)
         self._name = name
-        self._live = self.console.is_terminal and not quiet
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[text]}"),
-            console=self.console,
-            auto_refresh=False,
-            transient=True,
-        )
-        self._task: TaskID | None = None
         self._counts = (0, 0, 0)
         self._began: tuple[float, int] | None = None
         self._next = 0.0
         self._next_line = 0.0
-
-    def __enter__(self) -> Self:
-        if self._live:
-            self._progress.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if self._live:
-            self._progress.stop()
 
     def on_event(self, event: str, **info: Any) -> None:  # noqa: ANN401
         """Show one event of a study: compiling, runs, wait or failed."""
         now = time.monotonic()
         if event == "compiling":
             if now >= self._next or info["done"] == info["total"]:
-                self._next = now + _REFRESH
+                self._next = now + REFRESH
                 self._show("preparing kernels", info["done"], info["total"], "the first time 30 s")
         elif event == "failed":
             outcome = info["outcome"]
@@ -106,7 +81,7 @@ class StudyReporter:
         ended = done >= total
         if now < self._next and not ended:
             return
-        self._next = now + _REFRESH
+        self._next = now + REFRESH
         text = f"{done} of {total} runs · {self._left(now, done, total)} left"
         if failed:
             text += f" · {failed} failed"
@@ -123,18 +98,6 @@ class StudyReporter:
         hours, rest = divmod(seconds, 3600)
         minutes, rest = divmod(rest, 60)
         return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
-
-    def _show(self, what: str, done: float, total: float, text: str) -> None:
-        if not self._live:
-            return
-        if self._task is None:
-            self._task = self._progress.add_task(what, text="")
-        self._progress.update(
-            self._task, description=what, completed=done, total=total, text=text, refresh=True
-        )
-
-    def _say(self, text: str) -> None:
-        self.console.print(text, markup=False, soft_wrap=True)
 
 
 def print_summary(about: Mapping[str, Any], console: Console) -> None:
