@@ -280,7 +280,7 @@ def decision_times(seed: int = 3000) -> None:
         spent.append(time.thread_time() - started)
         return command
 
-    with patch.dict(policies._POLICIES, lookahead=timed):
+    with patch.dict(policies.POLICIES._rivals, lookahead=timed):
         for aircraft, height in ((1, 2.0), (1, 1.25), (1, 2.0), (2, 1.25), (2, 2.0)):
             spent.clear()
             fly(Case(aircraft, height, 2.0, 0.0), {"pursuit": "lookahead"}, 3.0, seed)

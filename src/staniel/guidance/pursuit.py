@@ -24,8 +24,10 @@ from staniel.errors import StanielError
 from staniel.guidance.config import GuidanceConfig
 from staniel.guidance.dangers import NO_DANGERS, Dangers
 from staniel.guidance.loiter import loiter
+from staniel.guidance.registry import Registry
 
 __all__ = [
+    "POLICIES",
     "NoFeasibleFlightError",
     "Partner",
     "Policy",
@@ -105,51 +107,17 @@ class Pursuit:
 
 Policy = Callable[[Pursuit], Command]
 
-_POLICIES: dict[str, Policy] = {}
+POLICIES: Registry[Policy] = Registry("pursuit policy", "guidance.pursuit", ValueError)
+"""All that are registered."""
 
+pursuit_policy = POLICIES.register
+"""Decorator: registers a function as the pursuit policy of a name; ValueError where it is taken."""
 
-def pursuit_policy(name: str) -> Callable[[Policy], Policy]:
-    """Register the decorated function as the pursuit policy `name`.
+pursuit_names = POLICIES.names
+"""Names of all registered pursuit policies, sorted."""
 
-    Parameters
-    ----------
-    name : str
-        What ``guidance.pursuit`` calls it.
-
-    Raises
-    ------
-    ValueError
-        The name is taken by another function.
-    """
-
-    def register(policy: Policy) -> Policy:
-        if _POLICIES.get(name, policy) is not policy:
-            raise ValueError(f"pursuit policy {name!r} is registered already")
-        _POLICIES[name] = policy
-        return policy
-
-    return register
-
-
-def pursuit_names() -> list[str]:
-    """Names of all registered pursuit policies, sorted."""
-    return sorted(_POLICIES)
-
-
-def pursuit_policy_named(name: str) -> Policy:
-    """The policy registered as `name`.
-
-    Raises
-    ------
-    ValueError
-        Nobody registered it.
-    """
-    try:
-        return _POLICIES[name]
-    except KeyError:
-        raise ValueError(
-            f"guidance.pursuit = {name!r}: expected one of {', '.join(pursuit_names())}"
-        ) from None
+pursuit_policy_named = POLICIES.named
+"""The policy registered under a name; ValueError where nobody did."""
 
 
 @pursuit_policy("carrot")

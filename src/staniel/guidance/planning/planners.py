@@ -15,51 +15,23 @@ import numpy as np
 
 from staniel.errors import PlanningError
 from staniel.guidance.planning.problem import NoPath, Plan, Problem
+from staniel.guidance.registry import Registry
 
-__all__ = ["Planner", "plan", "planner", "planner_named", "planner_names"]
+__all__ = ["PLANNERS", "Planner", "plan", "planner", "planner_named", "planner_names"]
 
 Planner = Callable[[Problem, np.random.Generator], Plan | NoPath]
 
-_PLANNERS: dict[str, Planner] = {}
+PLANNERS: Registry[Planner] = Registry("planner", "planner", PlanningError)
+"""All that are registered."""
 
+planner = PLANNERS.register
+"""Decorator: registers a function as the planner of a name; ValueError where it is taken."""
 
-def planner(name: str) -> Callable[[Planner], Planner]:
-    """Register the decorated function as the planner `name`.
+planner_names = PLANNERS.names
+"""Names of all registered planners, sorted."""
 
-    Raises
-    ------
-    ValueError
-        The name is taken by another function.
-    """
-
-    def register(function: Planner) -> Planner:
-        if _PLANNERS.get(name, function) is not function:
-            raise ValueError(f"planner {name!r} is registered already")
-        _PLANNERS[name] = function
-        return function
-
-    return register
-
-
-def planner_names() -> list[str]:
-    """Names of all registered planners, sorted."""
-    return sorted(_PLANNERS)
-
-
-def planner_named(name: str) -> Planner:
-    """The planner registered as `name`.
-
-    Raises
-    ------
-    PlanningError
-        Nobody registered it.
-    """
-    try:
-        return _PLANNERS[name]
-    except KeyError:
-        raise PlanningError(
-            f"planner = {name!r}: expected one of {', '.join(planner_names())}"
-        ) from None
+planner_named = PLANNERS.named
+"""The planner registered under a name; PlanningError where nobody did."""
 
 
 def plan(
