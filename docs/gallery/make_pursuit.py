@@ -77,7 +77,8 @@ def main(source: Path, folder: Path = HERE) -> Path:
     draw(right, cases, LONGEST, 1.0, "longest gap of a mission [s]")
     right.set_xscale("log")
     right.set_xlim(left=3.0)
-    right.legend(frameon=False, fontsize=9, loc="lower right")
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(POLICIES), frameon=False)
     figure.suptitle("Means over the seeds, 95 % intervals; carrot and orbit at their best settings")
     path = folder / PICTURE
     figure.savefig(path, dpi=90)
