@@ -51,6 +51,7 @@ def test_killed_at_random_and_resumed_it_gives_the_same_bytes(tmp_path):
         while process.poll() is None and flown(out) < before + wanted:
             time.sleep(0.02)
         if process.poll() is not None:
+            process.communicate()
             break  # all is flown
         time.sleep(dice.uniform(0.0, 0.3))
         workers = workers_of(process)
