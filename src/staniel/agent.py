@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from staniel.city import City
 from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMap, Task
@@ -31,7 +32,8 @@ from staniel.guidance import (
     safe_loiter,
 )
 from staniel.kernels.dubins import shortest
-from staniel.tracking import Tracker, TrackingConfig
+from staniel.kernels.footprint import camera_axes, look
+from staniel.tracking import Coverage, Tracker, TrackingConfig
 
 __all__ = ["Agent", "Briefing"]
 
@@ -78,7 +80,7 @@ class Agent:
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
         airframe, clock = briefing.airframe, briefing.clock
         self.id, self._briefing = id, briefing
-        self._tracker = Tracker(briefing.tracking, rng, founder=id)
+        self._tracker = Tracker(briefing.tracking, rng, founder=id, chart=briefing.chart)
         self._allocation = Allocation(
             id,
             briefing.cooperation,
@@ -156,7 +158,25 @@ class Agent:
         for message in inbox:
             if isinstance(message, Report):
                 sightings.extend(message.sightings)
-        return self._tracker.step(percept.time, sightings)
+        return self._tracker.step(percept.time, sightings, self._coverage(percept))
+
+    def _coverage(self, percept: Percept) -> list[Coverage] | None:
+        """What the own camera has just looked at; not known of one whose pictures come late."""
+        camera, pose = self._briefing.camera, percept.pose
+        if camera.delay > 0.0:
+            return None
+        eye, goal = np.array([pose]), np.array([self.belief.goal])
+        axes = camera_axes(eye, goal, camera.mounting)
+
+        def shows(places: NDArray[np.float64]) -> NDArray[np.bool_]:
+            points = np.column_stack((places, np.full(len(places), camera.target_height)))
+            walls = self._briefing.chart.walls
+            seen: NDArray[np.bool_] = look(
+                walls, eye, axes, points, camera.half_aperture, camera.range
+            )[0]
+            return seen
+
+        return [Coverage(pose, shows, self._briefing.tracking.detection_probability)]
 
     def _allocate(
         self, percept: Percept, tracks: list[TrackEstimate], inbox: Sequence[Message]

@@ -226,7 +226,7 @@ def test_late_sightings_help_and_too_late_ones_do_nothing():
         late.step(k, [noisy(g, k - 1, straight(k - 1), reporter=3)])
     assert late.estimates[0].last_seen == 28.0
     assert math.dist(late.estimates[0].position, straight(29)) < 3.0
-    before = bytes_of(late.step(30, [see(26, straight(26), reporter=5)]))
+    before = bytes_of(late.step(30, [see(24, straight(24), reporter=5)]))
     other = Tracker(rng=4)
     drive(other, 15, straight)
     g = np.random.default_rng(9)

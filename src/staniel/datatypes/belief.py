@@ -54,6 +54,11 @@ class Sighting:
     pose : Pose, optional
         Where the camera was.
 
+    Attributes
+    ----------
+    row : tuple
+        Time, x, y, covariance xx, xy, yy, reporter: the same as plain numbers, for who reads many.
+
     Raises
     ------
     ValueError
@@ -70,12 +75,16 @@ class Sighting:
     covariance: NDArray[np.float64]
     reporter: int = field(default=-1, kw_only=True)
     pose: Pose | None = field(default=None, kw_only=True)
+    row: tuple[float, float, float, float, float, float, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         position = checked_floats(self.position, (2,), "Sighting.position")
         covariance = checked_covariance(self.covariance, "Sighting.covariance")
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "covariance", covariance)
+        (xx, xy), (_, yy) = covariance.tolist()
+        row = (float(self.time), *position.tolist(), xx, xy, yy, self.reporter)
+        object.__setattr__(self, "row", row)
         if not math.isfinite(self.time):
             raise ValueError(f"Sighting.time = {self.time}: expected a finite number of seconds")
 
@@ -114,6 +123,8 @@ class TrackEstimate:
         Probability in [0, 1] that the target is there at all.
     last_seen : float [s]
         Time of the newest sighting that went into it.
+    turn_rate : float [rad/s]
+        Mean of late, left positive; 0 where it is not known.
     """
 
     id: TrackId
@@ -123,6 +134,7 @@ class TrackEstimate:
     covariance: NDArray[np.float64]
     existence: float
     last_seen: float
+    turn_rate: float = 0.0
 
     @property
     def course(self) -> float:

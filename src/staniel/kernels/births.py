@@ -13,6 +13,7 @@ Array = NDArray[Any]
 
 _CLIMB = 8
 _SAME_TIME = 1e-6
+_CHANGE, _TURN = 2.0, 0.7  # of a velocity: so many m/s, and this share of the speed, per second
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,12 +156,34 @@ def _compose(place: Array, xx: float, xy: float, yy: float) -> None:
 
 
 @njit(cache=True, error_model="numpy")
+def _share_of_reach(candidate: Array, place: Array, max_speed: float, gate: float) -> float:
+    """Squared distance of a place from where a candidate is expected, over that of its reach."""
+    base = 6 * int(candidate[0]) - 4
+    last = candidate[base : base + 6]
+    gone = place[0] - last[0]
+    x, y, variance, change = last[1], last[2], last[3] + last[5], max_speed
+    if candidate[0] >= 2.0 and gone > _SAME_TIME:
+        before = candidate[base - 6 : base]
+        share = gone / (last[0] - before[0])
+        vx, vy = (last[1] - before[1]) / gone * share, (last[2] - before[2]) / gone * share
+        x, y = x + vx * gone, y + vy * gone
+        variance = (1.0 + share) ** 2 * variance + share * share * (before[3] + before[5])
+        change = min(max_speed, _CHANGE + _TURN * sqrt(vx * vx + vy * vy))
+    reach = gate * sqrt(variance + place[3] + place[5]) + change * abs(gone)
+    dx, dy = place[1] - x, place[2] - y
+    square: float = (dx * dx + dy * dy) / (reach * reach)
+    return square
+
+
+@njit(cache=True, error_model="numpy")
 def follow(candidates: Array, places: Array, max_speed: float, gate: float) -> Array:
     """Let candidates claim the places they can have reached; the rest become new candidates.
 
     A candidate claims the nearest place within reach of its last hit, ``max_speed·Δt`` plus `gate`
-    standard deviations of both. A place at the time of its last hit refines that hit instead of
-    counting again; an older one is absorbed. One step without a hit is allowed.
+    standard deviations of both. One with two hits or more has a velocity: then the reach is about
+    where that leads, and allows for a change of the velocity instead of for any velocity. A place
+    at the time of its last hit refines that hit instead of counting again; an older one is
+    absorbed. One step without a hit is allowed.
 
     Parameters
     ----------
@@ -191,11 +214,7 @@ def follow(candidates: Array, places: Array, max_speed: float, gate: float) -> A
         place = places[q]
         best, closest = -1, 1.0
         for i in range(alive):
-            base = 6 * int(out[i, 0]) - 4
-            variance = out[i, base + 3] + out[i, base + 5] + place[3] + place[5]
-            reach = gate * sqrt(variance) + max_speed * abs(place[0] - out[i, base])
-            dx, dy = place[1] - out[i, base + 1], place[2] - out[i, base + 2]
-            share = (dx * dx + dy * dy) / (reach * reach)
+            share = _share_of_reach(out[i], place, max_speed, gate)
             if share < closest:
                 best, closest = i, share
         if best < 0:

@@ -1,6 +1,7 @@
-"""What an agent believes: one particle filter a track, births, association, deletion."""
+"""What an agent believes: one particle filter a track, births, association, fusion, deletion."""
 
 from staniel.tracking.config import TrackingConfig
+from staniel.tracking.coverage import Coverage
 from staniel.tracking.tracker import Tracker
 
-__all__ = ["Tracker", "TrackingConfig"]
+__all__ = ["Coverage", "Tracker", "TrackingConfig"]

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,9 @@ class Doubles:
     def _close(self, estimates: Sequence[TrackEstimate]) -> list[tuple[int, int]]:
         """Pairs within the distance, found by a sweep along the east axis."""
         reach = self._distance
+        east = sorted([float(estimate.position[0]) for estimate in estimates])
+        if all(b - a > reach for a, b in pairwise(east)):
+            return []
         places = [estimate.position.tolist() for estimate in estimates]
         order = sorted(range(len(places)), key=lambda k: places[k][0])
         pairs = []

@@ -52,7 +52,7 @@ class Intake:
 
     def __init__(self, late_limit: float) -> None:
         self._late_limit = late_limit
-        self._heard: dict[Key, None] = {}
+        self._heard: dict[float, set[Key]] = {}
 
     def read(self, now: float, sightings: Sequence[Sighting]) -> Batch:
         """Check and order the sightings, leaving out the late and the known. Changes nothing.
@@ -65,30 +65,28 @@ class Intake:
         heard = self._heard
         fresh: dict[Key, tuple[float, float, float, float, float, float, int]] = {}
         for number, sighting in enumerate(sightings):
-            time = sighting.time
+            time, x, y, xx, xy, yy, reporter = sighting.row
             if time > now + _CLOCK_TOLERANCE:
                 raise StanielError(
                     f"sightings[{number}].time = {time:g}: expected {now:g}, the step's, or earlier"
                 )
-            x, y = sighting.position.tolist()
-            (xx, xy), (_, yy) = sighting.covariance.tolist()
             if not (abs(x) <= _FARTHEST and abs(y) <= _FARTHEST and xx + yy <= _LARGEST):
                 raise StanielError(
                     f"sightings[{number}] at ({x:g}, {y:g}), variances {xx:g} and {yy:g}: "
                     f"expected within {_FARTHEST:g} m, and variances up to {_LARGEST:g} m²"
                 )
-            reporter = sighting.reporter
             key = (reporter, time, x, y)
-            if time >= now - self._late_limit and key not in heard:
+            if time >= now - self._late_limit and key not in heard.get(time, ()):
                 fresh[key] = (time, x, y, xx + _SMALLEST, xy, yy + _SMALLEST, reporter)
         return _batch(fresh)
 
     def accept(self, batch: Batch, now: float) -> None:
         """Remember a batch, and forget what is too old to come again."""
         oldest = now - self._late_limit
-        heard = {key: None for key in self._heard if key[1] >= oldest}
-        heard.update(dict.fromkeys(batch.keys))
-        self._heard = heard
+        for time in [time for time in self._heard if time < oldest]:
+            del self._heard[time]
+        for key in batch.keys:
+            self._heard.setdefault(key[1], set()).add(key)
 
 
 def _batch(fresh: dict[Key, tuple[float, float, float, float, float, float, int]]) -> Batch:

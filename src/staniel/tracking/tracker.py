@@ -3,24 +3,35 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from staniel.city import City
 from staniel.datatypes.belief import Sighting, TrackEstimate, TrackId
 from staniel.errors import StanielError
-from staniel.kernels import association, births
-from staniel.kernels import particles as kernels
+from staniel.kernels import association
+from staniel.kernels.gating import gated
+from staniel.kernels.random import fold
+from staniel.tracking.assignment import FREE, assign
 from staniel.tracking.bank import Bank
 from staniel.tracking.config import TrackingConfig
+from staniel.tracking.coverage import Coverage, checked_coverage
 from staniel.tracking.doubles import Doubles, dispersion
-from staniel.tracking.intake import Intake
+from staniel.tracking.intake import Batch, Intake
+from staniel.tracking.memory import Memory
+from staniel.tracking.nursery import Nursery
 
 __all__ = ["Tracker"]
 
 Floats = NDArray[np.float64]
 
+Ints = NDArray[np.int64]
+
 _LOG_ODDS_LIMIT = math.log(999.0)
+_WIDE = 4.0  # a cloud of so many times the sighting's variance is no Gaussian
+_AT_A_TRACK = -2  # owner of a free sighting that cannot start another track
 
 
 @dataclass(slots=True)
@@ -49,6 +60,8 @@ class Tracker:
         give the same bytes.
     founder : int, optional
         Who names new tracks: goes into their `TrackId`.
+    chart : City, optional
+        Particles keep to its streets; they turn where they would drive into a building.
 
     Attributes
     ----------
@@ -58,21 +71,29 @@ class Tracker:
         Tracks deleted in the last step, each as it was when it was last seen.
     merged : list of (TrackId, TrackId)
         Tracks found to be doubles in the last step: the name dropped, the older name kept.
+    returned : list of TrackId
+        Lost targets that were found again in the last step, under their old names.
 
     Notes
     -----
-    *Late sightings* (time before that of the step) meet every particle at
-    :math:`x - v\,(t - t_s)`, which is exact for straight motion; older than ``late_limit`` are
-    ignored, and so is a second copy of a sighting (same reporter, time and position).
+    *Late sightings* meet every particle where it was at their time, along its own path, as far as
+    the last seven steps tell and straight back beyond; older than ``late_limit`` are ignored, and
+    so is a second copy of a sighting (same reporter, time and position).
 
-    *Looks.* Sightings of one reporter and time are one look: a target causes at most one of them,
-    so a track takes the likeliest and leaves the others to other tracks and to births. Looks of
-    several reporters are independent and their likelihoods multiply.
+    *Looks.* Sightings of one reporter and time are one look: a target causes at most one of them.
+    Looks of several reporters are independent and their likelihoods multiply.
 
-    *Existence* is a two-state Bayes filter in log odds: an accepted sighting multiplies the odds by
-    :math:`P_D \sum_i w_i N(z; x_i, \Sigma)/\lambda` (λ the clutter density), a step without one by
-    :math:`1 - P_D P_V` (:math:`P_V` = ``view_probability``: nobody says here what was looked at).
-    Odds are capped at 999 : 1.
+    *Weights.* A particle stands for a Gaussian of ``kernel`` times the cloud's spread; see
+    `staniel.kernels.weighing`. With ``kernel = 0`` it is a bootstrap filter.
+
+    *Existence* is a two-state Bayes filter in log odds: a step with k looks that showed the track
+    multiplies the odds by :math:`\sum_i w_i \prod (1 - P_D + P_D N(z; x_i, S)/\lambda)` (λ the
+    clutter density), one without by :math:`\sum_i w_i \prod (1 - P_D v_i)`, :math:`v_i` whether a
+    look would have shown the particle, or :math:`1 - P_D P_V` (:math:`P_V` =
+    ``view_probability``) where nobody says what was looked at. Odds are capped at 999 : 1.
+
+    *Return.* A lost target's particles are kept for ``remember`` seconds. A track that is born
+    where they make it likelier than a newcomer takes the old name.
 
     Examples
     --------
@@ -89,6 +110,7 @@ class Tracker:
         rng: int | np.random.Generator | None = None,
         *,
         founder: int = 0,
+        chart: City | None = None,
     ) -> None:
         self.config = c = config or TrackingConfig()
         if isinstance(rng, np.random.Generator):
@@ -98,27 +120,28 @@ class Tracker:
         self.estimates: list[TrackEstimate] = []
         self.lost: list[TrackEstimate] = []
         self.merged: list[tuple[TrackId, TrackId]] = []
+        self.returned: list[TrackId] = []
         self._founder = founder
         self._time: float | None = None
-        self._steps = 0
         self._born = 0
         self._tracks: list[_Track] = []
-        self._bank = Bank(c, key)
+        self._bank = Bank(c, key, chart)
         self._intake = Intake(c.late_limit)
-        self._candidates = np.zeros((0, 2 + 6 * c.confirmations))
+        self._nursery = Nursery(c)
+        self._memory = Memory(c, fold(key, 0), chart)
         self._doubles = Doubles(c.merge_distance, c.merge_steps)
-        self._motion = np.array(
-            [c.max_speed, c.turn_noise, c.speed_noise, c.diffusion, c.turn_rate, c.restart_rate]
-        )
-        # A sighting in the gate that is clutter stands beside a missed target: λ (1 - P_D)/P_D.
-        missed = (1.0 - c.detection_probability) / c.detection_probability
-        floor = c.clutter_density * missed
-        self._limits = np.array([c.gate, c.clutter_density, floor, c.birth_distance, c.roughening])
+        self._clutter = math.log(c.clutter_density)
+        self._odds = c.detection_probability / (1.0 - c.detection_probability)
         self._hit = math.log(c.detection_probability / c.clutter_density)
         self._miss = math.log(1.0 - c.detection_probability * c.view_probability)
 
-    def step(self, time: float, sightings: Sequence[Sighting]) -> list[TrackEstimate]:
-        """Take the tracks to `time` and let them meet what was seen.
+    def step(
+        self,
+        time: float,
+        sightings: Sequence[Sighting],
+        coverage: Sequence[Coverage | tuple[Any, ...]] | None = None,
+    ) -> list[TrackEstimate]:
+        """Take the tracks to `time` and let them meet what was seen, and what was not.
 
         Parameters
         ----------
@@ -126,6 +149,9 @@ class Tracker:
             Not before the last step's.
         sightings : sequence of Sighting
             Of any reporters, in any order, none later than `time`. May be empty.
+        coverage : sequence of Coverage, or of (pose, visible polygon, detection probability)
+            What was looked at in this step: where a look shows nothing there is probably nothing.
+            Not given: nobody says, and ``view_probability`` stands for it.
 
         Returns
         -------
@@ -135,47 +161,64 @@ class Tracker:
         Raises
         ------
         StanielError
-            Time not finite or running backwards, or a sighting that cannot be used. Nothing has
-            changed then.
+            Time not finite or running backwards, a sighting or a look that cannot be used. Nothing
+            has changed then.
         """
         now = self._checked(time)
         batch = self._intake.read(now, sightings)
-        dt = 0.0 if self._time is None else now - self._time
+        looks = checked_coverage(coverage, now)
+        before = now if self._time is None else self._time
         self._time = now
-        self._steps += 1
         self._intake.accept(batch, now)
 
-        bank, c = self._bank, self.config
-        moments = kernels.predict(
-            bank.state, bank.weights, bank.keys, bank.count, self._steps, dt, self._motion
-        )
-        owners, scores = association.associate(
-            bank.state,
-            bank.weights,
-            bank.log_weights,
-            bank.origins,
-            moments,
-            batch.values,
-            batch.looks,
-            now,
-            self._limits,
-        )
-        rows = kernels.settle(
-            bank.state,
-            bank.weights,
-            bank.log_weights,
-            bank.origins,
-            bank.keys,
-            bank.count,
-            self._steps,
-            c.resample_below,
-            c.roughening,
-        )
-        seen = self._update(owners.tolist(), scores.tolist(), batch.times, dt)
-        self.estimates = self._describe(rows, now, seen)
-        self._delete(self._doubles.step(self.estimates, owners, batch.looks))
-        self._give_birth(batch.values[owners == -1], now)
+        bank = self._bank
+        bank.predict(before, now)
+        owners, pairs, shares = self._associate(batch, now)
+        hits = bank.correct(now, batch.values, batch.looks, pairs, shares)
+        if looks:
+            self._miss_in_view(looks, hits, now)
+        rows = bank.settle()
+        seen = np.zeros(bank.count, np.bool_)
+        seen[owners[owners >= 0]] = True
+        if now > before:
+            bank.learn(rows, seen, now - before)
+        self._update(rows[:, 9], hits, seen, looks is not None, now > before)
+        self._note_times(owners.tolist(), batch.times)
+        self.estimates = self._describe(rows, now, seen.tolist())
+        self._delete(rows, self._doubles.step(self.estimates, owners, batch.looks), now)
+        self._give_birth(batch.values[owners == FREE], now)
         return list(self.estimates)
+
+    def _associate(self, batch: Batch, now: float) -> tuple[Ints, Ints, Floats]:
+        """Owner of each sighting, pairs inside the gates, and the share of each pair."""
+        c, bank = self.config, self._bank
+        covariances = bank.expected
+        pairs, scores, nearest = gated(
+            bank.means, covariances, bank.origins, batch.values, now, c.gate, c.birth_distance
+        )
+        open_ = association.contested(pairs, batch.looks, bank.count)
+        if len(pairs):
+            # A Gaussian stands for a narrow cloud; a wide one is asked particle by particle.
+            spread = covariances[pairs[:, 0], 0, 0] + covariances[pairs[:, 0], 1, 1]
+            noise = batch.values[pairs[:, 1], 3] + batch.values[pairs[:, 1], 5]
+            association.rescore(
+                pairs, scores, open_ | (spread > _WIDE * noise), bank.state, bank.weights,
+                bank.origins, covariances, batch.values, now, c.kernel,
+            )  # fmt: skip
+        owners, shares = assign(
+            c.association, pairs, scores, open_, batch.looks, self._clutter, self._odds
+        )
+        owners[(owners == FREE) & (nearest < c.birth_distance)] = _AT_A_TRACK
+        return owners, pairs, shares
+
+    def _miss_in_view(self, looks: list[Coverage], hits: Ints, now: float) -> None:
+        """Take weight from the particles of unseen tracks that a look would have shown."""
+        bank = self._bank
+        for k in np.flatnonzero(hits == 0).tolist():
+            for look in looks:
+                shown = look.shows(bank.places(k, now if look.time is None else look.time, now))
+                missed = math.log1p(-look.detection_probability)
+                bank.log_weights[k] += np.where(shown, np.float32(missed), np.float32(0.0))
 
     def particles(self, track: TrackId) -> Floats:
         """Copy of a track's particles, weights apart.
@@ -211,6 +254,7 @@ class Tracker:
         track.known = replace(track.known, id=new)
         self.estimates[k] = replace(self.estimates[k], id=new)
         self._doubles.forget(old)
+        self._memory.forget({new})
 
     def _index(self, track: TrackId) -> int:
         for k, live in enumerate(self._tracks):
@@ -229,31 +273,35 @@ class Tracker:
         return now
 
     def _update(
-        self, owners: list[int], scores: list[float], times: list[float], dt: float
-    ) -> set[int]:
-        """Existence, last sighting and patience of every track; returns those seen in this step."""
-        seen = set()
-        for owner, score, time in zip(owners, scores, times, strict=True):
-            if owner >= 0:
-                seen.add(owner)
-                track = self._tracks[owner]
-                track.log_odds += self._hit + score
-                track.last_seen = max(track.last_seen, time)
-        for k, track in enumerate(self._tracks):
-            if k in seen:
-                track.unseen = 0
-                track.log_odds = min(track.log_odds, _LOG_ODDS_LIMIT)
-            elif dt > 0.0:
-                track.unseen += 1
+        self, evidence: Floats, hits: Ints, seen: NDArray[np.bool_], told: bool, moved: bool
+    ) -> None:
+        """Existence and patience of every track."""
+        for track, likelihood, looks, sure in zip(
+            self._tracks, evidence.tolist(), hits.tolist(), seen.tolist(), strict=True
+        ):
+            if looks or told:
+                track.log_odds += likelihood + looks * self._hit
+            elif moved:
                 track.log_odds += self._miss
-        return seen
+            track.log_odds = min(track.log_odds, _LOG_ODDS_LIMIT)
+            if sure:
+                track.unseen = 0
+            elif moved:
+                track.unseen += 1
 
-    def _describe(self, rows: Floats, now: float, seen: set[int]) -> list[TrackEstimate]:
+    def _note_times(self, owners: list[int], times: list[float]) -> None:
+        for owner, time in zip(owners, times, strict=True):
+            if owner >= 0:
+                track = self._tracks[owner]
+                track.last_seen = max(track.last_seen, time)
+
+    def _describe(self, rows: Floats, now: float, seen: list[bool]) -> list[TrackEstimate]:
         rows.flags.writeable = False
         covariances = rows[:, 4:8].reshape(-1, 2, 2)
+        turns = self._bank.habits[: len(rows), 1].tolist()
         estimates = []
-        for k, (track, position, velocity, covariance) in enumerate(
-            zip(self._tracks, rows[:, :2], rows[:, 2:4], covariances, strict=True)
+        for k, (track, position, velocity, covariance, turn_rate) in enumerate(
+            zip(self._tracks, rows[:, :2], rows[:, 2:4], covariances, turns, strict=True)
         ):
             estimate = TrackEstimate(
                 track.id,
@@ -263,29 +311,34 @@ class Tracker:
                 covariance,
                 1.0 / (1.0 + math.exp(-track.log_odds)),
                 track.last_seen,
+                turn_rate,
             )
-            if k in seen:
+            if seen[k]:
                 track.known = estimate
             estimates.append(estimate)
         return estimates
 
-    def _delete(self, doubles: list[tuple[int, int]]) -> None:
+    def _delete(self, rows: Floats, doubles: list[tuple[int, int]], now: float) -> None:
         """Delete doubles, and what dispersed or was unseen for too long."""
         c = self.config
         self.merged = [(self._tracks[k].id, self._tracks[older].id) for k, older in doubles]
         for k, older in doubles:
             self._inherit(k, older)
         dropped = [k for k, _ in doubles]
+        wide = (rows[:, 4] + rows[:, 7] > c.dispersion_limit**2).tolist()
         expired = [
             k
             for k, track in enumerate(self._tracks)
             if k not in dropped
             and (
                 track.unseen >= c.unseen_limit
-                or dispersion(self.estimates[k].covariance) > c.dispersion_limit
+                # Nobody is dispersed whose covariance has a smaller trace than that.
+                or (wide[k] and dispersion(self.estimates[k].covariance) > c.dispersion_limit)
             )
         ]
         self.lost = [self._tracks[k].known for k in expired]
+        for k in expired:
+            self._memory.store(self._tracks[k].id, self._bank, k, now)
         if dropped or expired:
             kept = [k for k in range(len(self._tracks)) if k not in dropped and k not in expired]
             self._tracks = [self._tracks[k] for k in kept]
@@ -306,21 +359,15 @@ class Tracker:
         heir.unseen = min(heir.unseen, donor.unseen)
 
     def _give_birth(self, free: Floats, now: float) -> None:
-        """Let candidates meet the free sightings; confirmed ones become tracks."""
-        c = self.config
-        if not len(free) and not len(self._candidates):
-            return
-        places = births.propose(free, c.birth_spacing, c.birth_window)
-        candidates = births.follow(self._candidates, places, c.max_speed, c.birth_gate)
-        confirmed = candidates[:, 0] >= c.confirmations
-        self._candidates = candidates
-        if not confirmed.any():
-            return
-        self._candidates = np.ascontiguousarray(candidates[~confirmed])
-        for candidate in candidates[confirmed]:
-            place = births.fit(candidate, now, 0.5 * c.max_speed)
+        """Confirmed candidates become tracks, under an old name where a lost target returns."""
+        self.returned = []
+        newborn = self._nursery.step(free, now)
+        newborn = [born for born in newborn if not self._occupied(born[0][:, 0].tolist())]
+        names = self._memory.claim([place for place, _ in newborn], now)
+        for (place, last_seen), name in zip(newborn, names, strict=True):
+            # Of two candidates at one place the first is a track by now.
             if not self._occupied(place[:, 0].tolist()):
-                self._launch(place, float(candidate[-6]), now)
+                self._launch(place, last_seen, now, name)
 
     def _occupied(self, place: list[float]) -> bool:
         return any(
@@ -328,10 +375,14 @@ class Tracker:
             for estimate in self.estimates
         )
 
-    def _launch(self, place: Floats, last_seen: float, now: float) -> None:
-        self._born += 1
+    def _launch(self, place: Floats, last_seen: float, now: float, name: TrackId | None) -> None:
+        if name is None:
+            self._born += 1
+            name = TrackId(now, self._founder, self._born)
+        else:
+            self.returned.append(name)
         estimate = TrackEstimate(
-            TrackId(now, self._founder, self._born),
+            name,
             now,
             place[:, 0],
             place[:, 1],
