@@ -162,14 +162,14 @@ class Agent:
 
     def _coverage(self, percept: Percept) -> list[Coverage] | None:
         """What the own camera has just looked at; not known of one whose pictures come late."""
-        camera, pose = self._briefing.camera, percept.pose
+        camera, pose, goal = self._briefing.camera, percept.pose, self.belief.goal
         if camera.delay > 0.0:
             return None
-        eye, goal = np.array([pose]), np.array([self.belief.goal])
-        axes = camera_axes(eye, goal, camera.mounting)
 
         def shows(places: NDArray[np.float64]) -> NDArray[np.bool_]:
-            points = np.column_stack((places, np.full(len(places), camera.target_height)))
+            eye, points = np.array([pose]), np.empty((len(places), 3))
+            points[:, :2], points[:, 2] = places, camera.target_height
+            axes = camera_axes(eye, np.array([goal]), camera.mounting)
             walls = self._briefing.chart.walls
             seen: NDArray[np.bool_] = look(
                 walls, eye, axes, points, camera.half_aperture, camera.range

@@ -6,17 +6,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.gating import gated
 from staniel.kernels.lanes import LANES, exp32, total_of
 
-__all__ = ["contested", "marginals", "rescore", "warm"]
+__all__ = ["contested", "marginals", "paired", "rescore", "warm"]
 
 Array = NDArray[Any]
 
 _LOG_2PI = 1.8378770664093453
+_WIDE = 4.0  # a cloud of so many times the sighting's variance is no Gaussian
 
 
 @njit(cache=True, error_model="numpy")
-def contested(pairs: Array, looks: Array, tracks: int) -> Array:
+def contested(pairs: Array, looks: Array) -> Array:
     """Which pairs are not the only one of their sighting, or of their track in the look.
 
     Parameters
@@ -25,7 +27,6 @@ def contested(pairs: Array, looks: Array, tracks: int) -> Array:
         Track and sighting, in ascending order of the track.
     looks : (m,) int64 array
         Number of the look of each sighting.
-    tracks : int
 
     Returns
     -------
@@ -103,6 +104,47 @@ def rescore(
 
 
 @njit(cache=True, error_model="numpy")
+def paired(
+    means: Array,
+    covariances: Array,
+    state: Array,
+    weights: Array,
+    origins: Array,
+    sightings: Array,
+    looks: Array,
+    now: float,
+    gate: float,
+    near: float,
+    width: float,
+) -> tuple[Array, Array, Array, Array]:
+    """Pairs inside the gates, each with its score, and which of them have a rival.
+
+    A Gaussian stands for a narrow cloud without rivals; all others are asked particle by particle.
+
+    Parameters
+    ----------
+    means, covariances, origins, sightings, now, gate, near : as `gated` takes them
+    state, weights, width : as `rescore` takes them
+    looks : (m,) int64 array
+
+    Returns
+    -------
+    pairs : (p, 2) int64 array
+    scores : (p,) float64 array
+    contested : (p,) bool array
+    nearest : (m,) float64 array [m]
+    """
+    pairs, scores, nearest = gated(means, covariances, origins, sightings, now, gate, near)
+    rivals = contested(pairs, looks)
+    asked = rivals.copy()
+    for p in range(len(pairs)):
+        cov, z = covariances[pairs[p, 0]], sightings[pairs[p, 1]]
+        asked[p] |= cov[0, 0] + cov[1, 1] > _WIDE * (z[3] + z[5])
+    rescore(pairs, scores, asked, state, weights, origins, covariances, sightings, now, width)
+    return pairs, scores, rivals, nearest
+
+
+@njit(cache=True, error_model="numpy")
 def marginals(pairs: Array, gains: Array, looks: Array, rounds: int) -> Array:
     """Share of each pair in its track's mixture: loopy belief propagation (Williams, Lau 2014).
 
@@ -162,8 +204,7 @@ def warm() -> None:
     """Compile, or load from the cache, what is called from Python in a flight."""
     state, weights = np.zeros((1, 4, 32), np.float32), np.full((1, 32), 1.0 / 32.0, np.float32)
     pairs, looks, one = np.zeros((1, 2), np.int64), np.zeros(1, np.int64), np.ones(1)
-    chosen = contested(pairs, looks, 1)
     z = np.array([[0.0, 1.0, 1.0, 1.0, 0.0, 1.0]])
     square = np.eye(4).reshape(1, 4, 4)
-    rescore(pairs, one, chosen, state, weights, np.zeros((1, 2)), square, z, 0.0, 0.1)
+    paired(np.zeros((1, 4)), square, state, weights, np.zeros((1, 2)), z, looks, 0.0, 4.0, 1.0, 0.5)
     marginals(pairs, one, looks, 5)

@@ -255,10 +255,11 @@ def fit(candidate: Array, now: float, spread: float) -> Array:
 
     Returns
     -------
-    (2, 5) float64 array
-        Per axis position [m], velocity [m/s], and their covariance pp, pv, vv.
+    (2, 6) float64 array
+        Per axis position [m], velocity [m/s], their covariance pp, pv, vv, and the sum of the
+        hits' squared distances from it [sigma²].
     """
-    out = np.empty((2, 5))
+    out = np.empty((2, 6))
     for axis in range(2):
         a, b, d, u, v = 0.0, 0.0, 1.0 / (spread * spread), 0.0, 0.0
         anchor = candidate[3 + axis]
@@ -274,6 +275,11 @@ def fit(candidate: Array, now: float, spread: float) -> Array:
         out[axis, 0] = anchor + (d * u - b * v) / det
         out[axis, 1] = (a * v - b * u) / det
         out[axis, 2], out[axis, 3], out[axis, 4] = d / det, -b / det, a / det
+        out[axis, 5] = 0.0
+        for i in range(int(candidate[0])):
+            hit = candidate[2 + 6 * i : 8 + 6 * i]
+            off = hit[1 + axis] - out[axis, 0] - (hit[0] - now) * out[axis, 1]
+            out[axis, 5] += off * off / hit[3 + 2 * axis]
     return out
 
 

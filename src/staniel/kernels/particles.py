@@ -205,9 +205,9 @@ def spawn(
     state : (4, n) float32 array
     weights, log_weights : (n,) float32 arrays
     key : uint64
-    place : (2, 5) float64 array
+    place : (2, 6) float64 array
         Per axis position [m, from the origin], velocity [m/s], their variances and covariance
-        (pp, pv, vv).
+        (pp, pv, vv); one column unused.
     fastest : float [m/s]
         Faster particles are slowed down to it.
     """
@@ -238,7 +238,7 @@ def warm() -> None:
     state = np.zeros((1, 4, n), np.float32)
     weights, logs = np.empty((1, n), np.float32), np.empty((1, n), np.float32)
     keys = np.array([1], np.uint64)
-    spawn(state[0], weights[0], logs[0], keys[0], np.ones((2, 5)), 4.0)
+    spawn(state[0], weights[0], logs[0], keys[0], np.ones((2, 6)), 4.0)
     ancestors, copied = np.zeros((1, SLOTS, n), np.int32), np.zeros((1, SLOTS), np.bool_)
     settle(
         state, weights, logs, np.zeros((1, 2)), keys, ancestors, copied, 0, 1, 1, draws_of(n), 0.5,

@@ -165,6 +165,9 @@ class Bank:
 
     def places(self, k: int, time: float, now: float) -> Floats:
         """Where the particles of cloud `k` were at `time`, before they settle, (n, 2) [m]."""
+        if time >= now:
+            present: Floats = self.state[k, :2].T + self.origins[k]
+            return present
         n = self.state.shape[2]
         out = np.empty((2, n), np.float32)
         places_at(

@@ -71,6 +71,9 @@ class TrackingConfig(Config):
     birth_existence: float = Field(
         0.9, gt=0.0, lt=1.0, description="probability that a new track is real"
     )
+    least_existence: float = Field(
+        0.02, ge=0.0, lt=1.0, description="a track that is less probably real is deleted"
+    )
     confirmations: int = Field(3, ge=2, le=20, description="consistent steps before a birth")
 
     unseen_limit: int = Field(

@@ -56,7 +56,7 @@ class Memory:
 
         Parameters
         ----------
-        places : sequence of (2, 5) float64 array
+        places : sequence of (2, 6) float64 array
             As `staniel.kernels.births.fit` gives them.
         now : float [s]
         """

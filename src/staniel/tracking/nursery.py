@@ -40,7 +40,8 @@ class Nursery:
         if not confirmed.any():
             return []
         self._candidates = np.ascontiguousarray(candidates[~confirmed])
-        return [
+        born = [
             (births.fit(candidate, now, 0.5 * c.max_speed), float(candidate[-6]))
             for candidate in candidates[confirmed]
         ]
+        return [(place, last) for place, last in born if place[:, 5].sum() <= c.birth_gate**2]

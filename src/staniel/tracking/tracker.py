@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from staniel.city import City
 from staniel.datatypes.belief import Sighting, TrackEstimate, TrackId
 from staniel.errors import StanielError
-from staniel.kernels import association
-from staniel.kernels.gating import gated
+from staniel.kernels.association import paired
 from staniel.kernels.random import fold
 from staniel.tracking.assignment import FREE, assign
 from staniel.tracking.bank import Bank
@@ -30,7 +29,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _LOG_ODDS_LIMIT = math.log(999.0)
-_WIDE = 4.0  # a cloud of so many times the sighting's variance is no Gaussian
 _AT_A_TRACK = -2  # owner of a free sighting that cannot start another track
 
 
@@ -192,21 +190,12 @@ class Tracker:
     def _associate(self, batch: Batch, now: float) -> tuple[Ints, Ints, Floats]:
         """Owner of each sighting, pairs inside the gates, and the share of each pair."""
         c, bank = self.config, self._bank
-        covariances = bank.expected
-        pairs, scores, nearest = gated(
-            bank.means, covariances, bank.origins, batch.values, now, c.gate, c.birth_distance
-        )
-        open_ = association.contested(pairs, batch.looks, bank.count)
-        if len(pairs):
-            # A Gaussian stands for a narrow cloud; a wide one is asked particle by particle.
-            spread = covariances[pairs[:, 0], 0, 0] + covariances[pairs[:, 0], 1, 1]
-            noise = batch.values[pairs[:, 1], 3] + batch.values[pairs[:, 1], 5]
-            association.rescore(
-                pairs, scores, open_ | (spread > _WIDE * noise), bank.state, bank.weights,
-                bank.origins, covariances, batch.values, now, c.kernel,
-            )  # fmt: skip
+        pairs, scores, contested, nearest = paired(
+            bank.means, bank.expected, bank.state, bank.weights, bank.origins, batch.values,
+            batch.looks, now, c.gate, c.birth_distance, c.kernel,
+        )  # fmt: skip
         owners, shares = assign(
-            c.association, pairs, scores, open_, batch.looks, self._clutter, self._odds
+            c.association, pairs, scores, contested, batch.looks, self._clutter, self._odds
         )
         owners[(owners == FREE) & (nearest < c.birth_distance)] = _AT_A_TRACK
         return owners, pairs, shares
@@ -217,8 +206,7 @@ class Tracker:
         for k in np.flatnonzero(hits == 0).tolist():
             for look in looks:
                 shown = look.shows(bank.places(k, now if look.time is None else look.time, now))
-                missed = math.log1p(-look.detection_probability)
-                bank.log_weights[k] += np.where(shown, np.float32(missed), np.float32(0.0))
+                bank.log_weights[k][shown] += math.log1p(-look.detection_probability)
 
     def particles(self, track: TrackId) -> Floats:
         """Copy of a track's particles, weights apart.
@@ -332,6 +320,7 @@ class Tracker:
             if k not in dropped
             and (
                 track.unseen >= c.unseen_limit
+                or self.estimates[k].existence < c.least_existence
                 # Nobody is dispersed whose covariance has a smaller trace than that.
                 or (wide[k] and dispersion(self.estimates[k].covariance) > c.dispersion_limit)
             )
