@@ -33,7 +33,7 @@ from staniel.guidance import (
 )
 from staniel.kernels.dubins import shortest
 from staniel.kernels.footprint import camera_axes, look
-from staniel.tracking import Coverage, Tracker, TrackingConfig
+from staniel.tracking import Aliases, Coverage, Tracker, TrackingConfig
 
 __all__ = ["Agent", "Briefing"]
 
@@ -81,6 +81,7 @@ class Agent:
         airframe, clock = briefing.airframe, briefing.clock
         self.id, self._briefing = id, briefing
         self._tracker = Tracker(briefing.tracking, rng, founder=id, chart=briefing.chart)
+        self._aliases = Aliases()
         self._allocation = Allocation(
             id,
             briefing.cooperation,
@@ -130,7 +131,13 @@ class Agent:
         command, guard = self._avoid(percept, inbox, command)
         if percept.sightings:
             outbox.append(
-                Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
+                Report(
+                    self.id,
+                    self._allocation.next_sequence(),
+                    time,
+                    sightings=percept.sightings,
+                    names=tuple(self._tracker.owner_of(seen) for seen in percept.sightings),
+                )
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
@@ -154,11 +161,21 @@ class Agent:
 
     def _track(self, percept: Percept, inbox: Sequence[Message]) -> list[TrackEstimate]:
         """Own sightings and those of the others, fused in one tracker."""
+        reports = [message for message in inbox if isinstance(message, Report)]
         sightings: list[Sighting] = list(percept.sightings)
-        for message in inbox:
-            if isinstance(message, Report):
-                sightings.extend(message.sightings)
-        return self._tracker.step(percept.time, sightings, self._coverage(percept))
+        for report in reports:
+            sightings.extend(report.sightings)
+        tracks = self._tracker.step(percept.time, sightings, self._coverage(percept))
+        told = [
+            (report.sender, report.time, own, name)
+            for report in reports
+            for seen, name in zip(report.sightings, report.names, strict=False)
+            if name is not None and (own := self._tracker.owner_of(seen)) is not None
+        ]
+        live = [track.id for track in tracks]
+        for old, new in self._aliases.step(told, live, self._allocation.held):
+            self._tracker.rename(old, new)
+        return list(self._tracker.estimates)
 
     def _coverage(self, percept: Percept) -> list[Coverage] | None:
         """What the own camera has just looked at; not known of one whose pictures come late."""

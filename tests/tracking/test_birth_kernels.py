@@ -107,7 +107,10 @@ def test_fit_is_least_squares(vx, vy, seed):
     covariance = np.linalg.inv(A.T @ W @ A)
     np.testing.assert_allclose(place[0, :2], covariance @ A.T @ W @ xs, atol=1e-6)
     np.testing.assert_allclose(place[1, :2], [-20.0 + 4.5 * vy, vy], atol=1e-6)
-    np.testing.assert_allclose(place[0, 2:], covariance[[0, 0, 1], [0, 1, 1]], rtol=1e-5)
+    np.testing.assert_allclose(place[0, 2:5], covariance[[0, 0, 1], [0, 1, 1]], rtol=1e-5)
+    residual = xs - A @ (covariance @ A.T @ W @ xs)
+    np.testing.assert_allclose(place[0, 5], residual @ W @ residual, atol=1e-6)
+    np.testing.assert_allclose(place[1, 5], 0.0, atol=1e-6)
 
 
 def test_the_prior_bounds_the_velocity_of_hits_at_one_time():
@@ -115,4 +118,4 @@ def test_the_prior_bounds_the_velocity_of_hits_at_one_time():
     candidate[0] = 3
     candidate[2:] = [v for x in (0.0, 1.0, 2.0) for v in (5.0, x, 0.0, *R)]
     place = fit(candidate, 5.0, 2.0)
-    np.testing.assert_allclose(place[0], [1.0, 0.0, 0.75, 0.0, 4.0])
+    np.testing.assert_allclose(place[0], [1.0, 0.0, 0.75, 0.0, 4.0, 2.0 / 2.25])

@@ -160,6 +160,12 @@ class Allocation:
         self._open_auctions()
         return self._out
 
+    @property
+    def held(self) -> set[TrackId]:
+        """Names of the targets that somebody is known to hold, or that are up for auction."""
+        names = {lease.target for lease in self._leases.values()} | set(self._auctions)
+        return names if self.holding is None else names | {self.holding.id}
+
     def heartbeat(
         self,
         role: str,

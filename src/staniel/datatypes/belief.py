@@ -53,11 +53,15 @@ class Sighting:
         Who saw it; -1 when unknown.
     pose : Pose, optional
         Where the camera was.
+    pose_deviation : float, optional [m]
+        Standard deviation of where the reporter believes to be, on each axis: a tracker adds it to
+        the covariance.
 
     Attributes
     ----------
     row : tuple
-        Time, x, y, covariance xx, xy, yy, reporter: the same as plain numbers, for who reads many.
+        Time, x, y, covariance xx, xy, yy with the reporter's own, reporter: as plain numbers, for
+        who reads many.
 
     Raises
     ------
@@ -75,6 +79,7 @@ class Sighting:
     covariance: NDArray[np.float64]
     reporter: int = field(default=-1, kw_only=True)
     pose: Pose | None = field(default=None, kw_only=True)
+    pose_deviation: float = field(default=0.0, kw_only=True)
     row: tuple[float, float, float, float, float, float, int] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -82,8 +87,12 @@ class Sighting:
         covariance = checked_covariance(self.covariance, "Sighting.covariance")
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "covariance", covariance)
+        off = self.pose_deviation
+        if not 0.0 <= off <= 1e6:
+            raise ValueError(f"Sighting.pose_deviation = {off}: expected 0 to a million metres")
         (xx, xy), (_, yy) = covariance.tolist()
-        row = (float(self.time), *position.tolist(), xx, xy, yy, self.reporter)
+        own = off * off
+        row = (float(self.time), *position.tolist(), xx + own, xy, yy + own, self.reporter)
         object.__setattr__(self, "row", row)
         if not math.isfinite(self.time):
             raise ValueError(f"Sighting.time = {self.time}: expected a finite number of seconds")
@@ -103,6 +112,7 @@ class Sighting:
             self.pose,
             self.position.tobytes(),
             self.covariance.tobytes(),
+            self.pose_deviation,
         )
 
 

@@ -61,9 +61,10 @@ class Heartbeat(Message):
 
 @dataclass(frozen=True, slots=True)
 class Report(Message):
-    """What my camera saw."""
+    """What my camera saw, and by which name I know what caused each sighting, if I do."""
 
     sightings: tuple[Sighting, ...]
+    names: tuple[TrackId | None, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

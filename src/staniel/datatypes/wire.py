@@ -12,7 +12,8 @@ pose           24 (six 4-byte numbers)
 heartbeat      head, pose, role 1, goal, track name, point, cost; where it helps a track name; and
                for a command 29: kind 1, seven 4-byte numbers, or of banks 13: kind 1, hold, speed
                and height, and 1 for their count and 2 for each
-report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose
+report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose;
+               and for each name that is told a track name
 warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
                each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,
                reporter 2, radius and rate 4 each
@@ -79,6 +80,7 @@ def wire_size(message: Message) -> int:
         size += _command_size(message.command)
     elif isinstance(message, Report):
         size += SIGHTING * len(message.sightings)
+        size += _NAME * sum(name is not None for name in message.names)
     elif isinstance(message, Warn):
         size += CARRIER * len(message.threats.carriers)
         size += sum(map(_region_size, message.threats.regions))

@@ -1,7 +1,8 @@
 """What an agent believes: one particle filter a track, births, association, fusion, deletion."""
 
+from staniel.tracking.aliases import Aliases
 from staniel.tracking.config import TrackingConfig
 from staniel.tracking.coverage import Coverage
 from staniel.tracking.tracker import Tracker
 
-__all__ = ["Coverage", "Tracker", "TrackingConfig"]
+__all__ = ["Aliases", "Coverage", "Tracker", "TrackingConfig"]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from staniel.datatypes.belief import Sighting
 from staniel.errors import StanielError
 
-__all__ = ["Batch", "Intake"]
+__all__ = ["Batch", "Intake", "Key"]
 
 _FARTHEST = 1e9
 _LARGEST = 1e12
@@ -18,6 +18,7 @@ _CLOCK_TOLERANCE = 1e-3
 _SMALLEST = 1e-6
 
 Key = tuple[int, float, float, float]
+"""Reporter, time, x, y of a sighting: by which a copy is recognised."""
 
 
 @dataclass(frozen=True, slots=True)

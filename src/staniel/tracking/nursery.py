@@ -10,6 +10,8 @@ __all__ = ["Newborn", "Nursery"]
 
 Floats = NDArray[np.float64]
 
+_MISFIT = 1.5  # of a candidate with a straight line, over the gate squared
+
 Newborn = tuple[Floats, float]
 """A place as `staniel.kernels.births.fit` gives it, and the time of its newest sighting [s]."""
 
@@ -44,4 +46,5 @@ class Nursery:
             (births.fit(candidate, now, 0.5 * c.max_speed), float(candidate[-6]))
             for candidate in candidates[confirmed]
         ]
-        return [(place, last) for place, last in born if place[:, 5].sum() <= c.birth_gate**2]
+        most = _MISFIT * c.birth_gate**2
+        return [(place, last) for place, last in born if place[:, 5].sum() <= most]

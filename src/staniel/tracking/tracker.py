@@ -18,7 +18,7 @@ from staniel.tracking.bank import Bank
 from staniel.tracking.config import TrackingConfig
 from staniel.tracking.coverage import Coverage, checked_coverage
 from staniel.tracking.doubles import Doubles, dispersion
-from staniel.tracking.intake import Batch, Intake
+from staniel.tracking.intake import Batch, Intake, Key
 from staniel.tracking.memory import Memory
 from staniel.tracking.nursery import Nursery
 
@@ -120,6 +120,7 @@ class Tracker:
         self.merged: list[tuple[TrackId, TrackId]] = []
         self.returned: list[TrackId] = []
         self._founder = founder
+        self._owners: dict[Key, TrackId] = {}
         self._time: float | None = None
         self._born = 0
         self._tracks: list[_Track] = []
@@ -183,6 +184,11 @@ class Tracker:
         self._update(rows[:, 9], hits, seen, looks is not None, now > before)
         self._note_times(owners.tolist(), batch.times)
         self.estimates = self._describe(rows, now, seen.tolist())
+        self._owners = {
+            key: self._tracks[owner].id
+            for key, owner in zip(batch.keys, owners.tolist(), strict=True)
+            if owner >= 0
+        }
         self._delete(rows, self._doubles.step(self.estimates, owners, batch.looks), now)
         self._give_birth(batch.values[owners == FREE], now)
         return list(self.estimates)
@@ -226,6 +232,11 @@ class Tracker:
         weights: Floats = self._bank.weights[self._index(track)].astype(np.float64)
         return weights
 
+    def owner_of(self, sighting: Sighting) -> TrackId | None:
+        """Name of the track that a sighting handed in with the last step went to, if any."""
+        time, x, y, _, _, _, reporter = sighting.row
+        return self._owners.get((reporter, time, x, y))
+
     def rename(self, old: TrackId, new: TrackId) -> None:
         """Give the live track `old` the name `new`.
 
@@ -242,6 +253,7 @@ class Tracker:
         track.known = replace(track.known, id=new)
         self.estimates[k] = replace(self.estimates[k], id=new)
         self._doubles.forget(old)
+        self._owners = {key: new if id == old else id for key, id in self._owners.items()}
         self._memory.forget({new})
 
     def _index(self, track: TrackId) -> int:
