@@ -18,6 +18,7 @@ from rich.table import Table
 
 import dubins
 import sight
+import tracking
 from staniel.agent import Agent
 from staniel.city import City
 from staniel.kernels.random import normals
@@ -231,6 +232,7 @@ def main() -> None:
     mission_speed(3 if quick else 10)
     stage_times(1 if quick else 5)
     particle_step(50 if quick else 300)
+    tracking.compare(quick=quick)
     sight.compare((100, 1_000) if quick else (100, 1_000, 10_000), 3 if quick else 15)
     small_kernels(5 if quick else 20)
     dubins.compare(repeats=3 if quick else 9)
