@@ -22,8 +22,7 @@ from rich.table import Table
 from scipy import stats
 
 from staniel.datatypes.belief import Sighting, TrackEstimate
-from staniel.metrics import gospa
-from staniel.metrics.following import IdentityKeeper
+from staniel.metrics import gospa, identity_scores
 from staniel.tracking import Tracker, TrackingConfig
 from swarm import Knowledge, Swarm, simulate
 
@@ -114,25 +113,23 @@ def fly(swarm: Swarm, seed: int) -> dict[str, dict[str, float]]:
     rivals = {name: make() for name, make in rivals_of(swarm, seed).items()}
     spent = {name: np.empty(steps) for name in rivals}
     scores = {name: np.empty((steps, 4)) for name in rivals}
-    keepers = {name: IdentityKeeper(targets) for name in rivals}
-    codes: dict[str, dict[str, int]] = {name: {} for name in rivals}
+    pictures: dict[str, list[tuple[list[str], Floats]]] = {name: [] for name in rivals}
     for k in range(steps):
         for name, rival in rivals.items():
             started = time.perf_counter()
             rival.step()
             spent[name][k] = time.perf_counter() - started
         for name, rival in rivals.items():
-            ids, places = rival.tracks()
+            pictures[name].append(rival.tracks())
+            places = pictures[name][-1][1]
             scores[name][k] = gospa(swarm.truth[k], places, cutoff=CUTOFF, order=ORDER)
-            apart = np.linalg.norm(swarm.truth[k][:, None] - places[None], axis=2)
-            numbers = [codes[name].setdefault(i, len(codes[name])) for i in ids]
-            keepers[name].update(apart, numbers)
+    truth = [(range(targets), places) for places in swarm.truth]
     return {
         name: {
             "ms": 1e3 * float(np.median(spent[name][BURN_IN:])),
             "all": float(scores[name][:, 0].mean()),
             **dict(zip(PARTS, scores[name][BURN_IN:].mean(axis=0).tolist(), strict=True)),
-            "switches": float(sum(keepers[name].switches)),
+            "switches": float(identity_scores(truth, pictures[name]).switches),
         }
         for name in rivals
     }
