@@ -5,12 +5,16 @@ interleaved, medians of repeats. ``--quick`` runs fewer repeats and leaves out t
 """
 
 import argparse
+import os
 import statistics
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+
+# Before NumPy is loaded: one thread each.
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
 from rich.console import Console
