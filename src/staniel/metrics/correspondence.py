@@ -11,9 +11,8 @@ __all__ = ["Correspondence"]
 Floats = NDArray[np.float64]
 
 _Pair = tuple[Hashable, Hashable]
-_Place = tuple[int, int]
-_Near = dict[_Pair, _Place]
-"""Row and column of each (target, track) within the gate."""
+_Near = dict[_Pair, tuple[int, int, float]]
+"""Row, column and distance of each (target, track) within the gate."""
 
 
 class Correspondence:
@@ -39,8 +38,8 @@ class Correspondence:
         Matches over all instants, switches included.
     distance : float [m]
         Sum of the matches' distances.
-    targets, tracks : Counter
-        In how many instants each was there.
+    targets, tracks : int
+        How many there were, summed over all instants.
     shared : Counter
         In how many instants each (target, track) was within the gate, matched or not.
     """
@@ -50,8 +49,8 @@ class Correspondence:
         self.fragmentations = 0
         self.matched = 0
         self.distance = 0.0
-        self.targets: Counter[Hashable] = Counter()
-        self.tracks: Counter[Hashable] = Counter()
+        self.targets = 0
+        self.tracks = 0
         self.shared: Counter[tuple[Hashable, Hashable]] = Counter()
         self._gate = gate
         self._last: dict[Hashable, Hashable] = {}
@@ -71,19 +70,22 @@ class Correspondence:
         tracks : sequence of m hashables
             The tracks' ids; no two are equal.
         """
-        self.targets.update(targets)
-        self.tracks.update(tracks)
-        rows, columns = (side.tolist() for side in np.nonzero(distances <= self._gate))
-        near = {}
-        for row, column in zip(rows, columns, strict=True):
-            near[targets[row], tracks[column]] = (row, column)
+        self.targets += len(targets)
+        self.tracks += len(tracks)
+        close = distances <= self._gate
+        sides = (side.tolist() for side in np.nonzero(close))
+        near: _Near = {}
+        for row, column, distance in zip(*sides, distances[close].tolist(), strict=True):
+            near[targets[row], tracks[column]] = (row, column, distance)
         self.shared.update(near.keys())
         matches = self._kept(near, targets)
-        matches |= self._found(near, distances, matches)
-        for (target, track), place in matches.items():
-            self._count(target, track, float(distances[place]))
-        matched = {target for target, _ in matches}
-        self._lost |= (self._last.keys() & targets) - matched
+        if len(matches) < min(len(targets), len(tracks)):
+            matches |= self._found(near, distances, matches)
+        for (target, track), (_, _, distance) in matches.items():
+            self._count(target, track, distance)
+        if len(matches) < len(targets):
+            matched = {target for target, _ in matches}
+            self._lost |= (self._last.keys() & targets) - matched
 
     def _kept(self, near: _Near, targets: Sequence[Hashable]) -> _Near:
         """The targets whose last track is near and not another's already."""
@@ -101,7 +103,7 @@ class Correspondence:
         """The best matches of the targets and tracks that are left."""
         had, taken = {target for target, _ in kept}, {track for _, track in kept}
         free = {
-            place: pair
+            place[:2]: pair
             for pair, place in near.items()
             if pair[0] not in had and pair[1] not in taken
         }
@@ -115,7 +117,7 @@ class Correspondence:
         costs[costs > self._gate] = self._gate * (1 + min(costs.shape))
         chosen = (side.tolist() for side in linear_sum_assignment(costs))
         places = ((rows[i], columns[j]) for i, j in zip(*chosen, strict=True))
-        return {free[place]: place for place in places if place in free}
+        return {free[place]: near[free[place]] for place in places if place in free}
 
     def _count(self, target: Hashable, track: Hashable, distance: float) -> None:
         self.matched += 1

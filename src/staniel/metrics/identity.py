@@ -111,7 +111,7 @@ def identity_scores(
 
 def scores_of(found: Correspondence) -> IdentityScores:
     """The scores of all instants that a correspondence has taken in."""
-    targets, tracks = found.targets.total(), found.tracks.total()
+    targets, tracks = found.targets, found.tracks
     switches, matched = found.switches.total(), found.matched
     misses, false = targets - matched, tracks - matched
     lasting = _lasting(found)
@@ -132,8 +132,11 @@ def _lasting(found: Correspondence) -> int:
     """IDTP: instants that the best lasting assignment of tracks to targets shares."""
     from scipy.optimize import linear_sum_assignment
 
-    row = {target: k for k, target in enumerate(found.targets)}
-    column = {track: k for k, track in enumerate(found.tracks)}
+    row: dict[Hashable, int] = {}
+    column: dict[Hashable, int] = {}
+    for target, track in found.shared:
+        row.setdefault(target, len(row))
+        column.setdefault(track, len(column))
     shared = np.zeros((len(row), len(column)))
     for (target, track), instants in found.shared.items():
         shared[row[target], column[track]] = instants
