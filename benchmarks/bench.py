@@ -5,6 +5,7 @@ interleaved, medians of repeats. ``--quick`` runs fewer repeats and leaves out t
 """
 
 import argparse
+import os
 import statistics
 import tempfile
 import time
@@ -12,12 +13,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+# Before NumPy is loaded: one thread each.
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 import dubins
 import sight
+import tracking
 from staniel.agent import Agent
 from staniel.city import City
 from staniel.kernels.random import normals
@@ -231,6 +236,7 @@ def main() -> None:
     mission_speed(3 if quick else 10)
     stage_times(1 if quick else 5)
     particle_step(50 if quick else 300)
+    tracking.compare(quick=quick)
     sight.compare((100, 1_000) if quick else (100, 1_000, 10_000), 3 if quick else 15)
     small_kernels(5 if quick else 20)
     dubins.compare(repeats=3 if quick else 9)

@@ -21,6 +21,8 @@ EXAMPLES = [
 
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_example_runs(example, tmp_path):
+    if "stonesoup" in example:
+        pytest.importorskip("stonesoup", reason="Stone Soup is the extra `stonesoup`")
     done = subprocess.run(
         [sys.executable, "-c", example],
         cwd=tmp_path,

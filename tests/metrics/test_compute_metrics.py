@@ -166,6 +166,52 @@ def test_matching_gives_as_many_vehicles_a_track_as_possible():
     assert [t["identity_switches"] for t in metrics["targets"]] == [0, 1]
 
 
+def test_identity_scores_of_the_team_picture_over_all_instants():
+    metrics = watched(
+        [
+            # 0 s: nothing yet. The staler copy of a name, far off, is not in the picture.
+            track(1.0, 0, "0-0", 503.0, 504.0, last_seen=1.0),
+            track(1.0, 1, "0-0", 600.0, 600.0),
+            track(2.0, 0, "0-0", 500.0, 520.0),  # out of the gate: missed, and one false
+            track(3.0, 0, "0-0", 501.0, 500.0),
+            track(4.0, 1, "1-5", 500.0, 503.0),  # another name
+        ]
+    )
+    team = metrics["team"]
+    assert (team["identity_switches"], team["fragmentations"]) == (1, 1)
+    assert (team["misses"], team["false_positives"]) == (2, 1)
+    assert team["mota"] == pytest.approx(1 - 4 / 5)
+    assert team["motp"] == pytest.approx((5 + 1 + 3) / 3)
+    assert (team["idp"], team["idr"], team["idf1"]) == pytest.approx(
+        (2 / 4, 2 / 5, 4 / 9), abs=1e-6
+    )
+
+
+def test_nees_while_visible_and_since_the_first_detection():
+    def rows(time, x, xx, yy, xy=0.0):
+        return {**track(time, 0, "0-0", x, 500.0), "cxx": xx, "cyy": yy, "cxy": xy}
+
+    metrics = compute(
+        seconds=6,
+        # East of 500 m + 80 m tan 60° it no longer sees the vehicle.
+        aircraft=[lambda t: (hover(500.0, 500.0) if t < 5.0 else hover(900.0, 500.0))(t)],
+        vehicles=[parked(500.0, 500.0), parked(700.0, 700.0)],
+        sightings=[sighting(1.0, 0)],
+        tracks=[
+            rows(0.0, 509.0, 1.0, 1.0),  # before the first detection
+            rows(1.0, 503.0, 2.25, 9.0),  # 4
+            rows(2.0, 502.0, 2.0, 2.0, 1.0),  # 4·2/3
+            rows(3.0, 502.0, 1.0, 1.0, 1.0),  # not positive definite
+            rows(4.0, 511.0, 1.0, 1.0),  # not near
+            rows(5.0, 509.0, 1.0, 1.0),  # not visible
+        ],
+    )
+    seen, unseen = metrics["targets"]
+    assert seen["position_nees"] == pytest.approx((4 + 8 / 3) / 2 / 2, abs=1e-6)
+    assert unseen["position_nees"] is None
+    assert metrics["team"]["position_nees"] == seen["position_nees"]
+
+
 def test_team_picture_takes_the_freshest_then_the_lowest_agent():
     record = make_record(
         seconds=1,
@@ -198,6 +244,8 @@ def test_gospa_means_over_all_steps_from_the_start():
     assert team["gospa_mean"] == pytest.approx(sum(steps) / 3, abs=1e-6)
     assert team["gospa_localisation"] == pytest.approx(50.0 / 3, abs=1e-6)
     assert team["gospa_missed"] == team["gospa_false"] == pytest.approx(200.0 / 3, abs=1e-6)
+    ospa = [20.0, 5.0, math.sqrt((25.0 + 400.0) / 2)]
+    assert team["ospa_mean"] == pytest.approx(sum(ospa) / 3, abs=1e-6)
     assert (team["tracks_started"], team["false_tracks"]) == (2, 1)
 
 
@@ -347,7 +395,8 @@ def test_empty_runs():
             "heard_share": None,
         }
     ]
-    assert nothing["team"]["gospa_mean"] == 0.0
+    assert nothing["team"]["gospa_mean"] == nothing["team"]["ospa_mean"] == 0.0
+    assert nothing["team"]["mota"] is nothing["team"]["position_nees"] is None
     assert nothing["team"]["visible_fraction"] is None
     one_tick = compute(
         seconds=0,
@@ -367,7 +416,7 @@ def test_a_record_cut_before_its_first_tick():
     metrics = compute_metrics(cut)
     json.dumps(metrics, allow_nan=False)
     assert metrics["complete"] is False
-    assert metrics["team"]["gospa_mean"] is None
+    assert metrics["team"]["gospa_mean"] is metrics["team"]["ospa_mean"] is None
     assert metrics["aircraft"][0]["min_separation"] is None
 
 

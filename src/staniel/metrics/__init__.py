@@ -2,8 +2,11 @@
 
 from staniel.metrics.compute import compute_metrics
 from staniel.metrics.flown import EXPOSURE_RANGE
-from staniel.metrics.following import GATE, gospa_steps
+from staniel.metrics.following import gospa_steps, ospa_steps
 from staniel.metrics.gospa import CUTOFF, ORDER, Gospa, gospa
+from staniel.metrics.identity import GATE, IdentityScores, identity_scores
+from staniel.metrics.nees import anees, consistency_band, nees
+from staniel.metrics.ospa import Ospa, ospa
 from staniel.metrics.picture import team_picture
 from staniel.metrics.unseen import Cause, Unwatched, unwatched
 
@@ -14,10 +17,18 @@ __all__ = [
     "ORDER",
     "Cause",
     "Gospa",
+    "IdentityScores",
+    "Ospa",
     "Unwatched",
+    "anees",
     "compute_metrics",
+    "consistency_band",
     "gospa",
     "gospa_steps",
+    "identity_scores",
+    "nees",
+    "ospa",
+    "ospa_steps",
     "team_picture",
     "unwatched",
 ]

@@ -9,7 +9,7 @@ from staniel.metrics.links import sender_metrics
 from staniel.metrics.targets import target_metrics
 from staniel.metrics.team import team_metrics
 from staniel.metrics.unseen import unwatched_metrics
-from staniel.metrics.visible import visible_samples
+from staniel.metrics.visible import visible_decisions, visible_samples
 from staniel.record import Record
 
 __all__ = ["compute_metrics"]
@@ -33,8 +33,9 @@ def compute_metrics(record: Record) -> dict[str, Any]:
         in ``docs/metrics.md``.
     """
     following = follow(record)
-    targets = target_metrics(record, following, visible_samples(record))
-    causes, team_causes = unwatched_metrics(record)
+    visible = visible_decisions(record)
+    targets = target_metrics(record, following, visible_samples(record), visible)
+    causes, team_causes = unwatched_metrics(record, visible)
     metrics = {
         "scenario": record.scenario.get("name"),
         "seed": record.scenario.get("seed"),

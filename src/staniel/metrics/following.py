@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.angles import wrap_array
+from staniel.metrics.correspondence import Correspondence
 from staniel.metrics.gospa import CUTOFF, ORDER, gospa_of_squares
+from staniel.metrics.identity import GATE, IdentityScores, scores_of
+from staniel.metrics.ospa import ospa_of_gospa
 from staniel.metrics.picture import freshest, id_codes
 from staniel.record import Record
 
-__all__ = ["GATE", "Following", "IdentityKeeper", "follow", "gospa_steps"]
-
-GATE = 10.0
-"""A track is a vehicle's as long as it is within this distance of it [m]."""
+__all__ = ["Following", "follow", "gospa_steps", "ospa_steps"]
 
 STANDING = 0.1
 """A slower vehicle has no course [m/s]."""
@@ -32,10 +32,17 @@ class Following:
     position_error, speed_error, course_error : (n, k) float array [m, m/s, rad]
         Of the nearest track of the team picture; NaN where none is within `GATE`, and, for the
         course, while the vehicle stands.
+    position_nees : (n, k) float array [-]
+        Of the same track's position, see `nees`; NaN where there is none, or where its recorded
+        covariance is not positive definite.
     switches : (k,) int array
         Identity switches of each vehicle.
+    identity : IdentityScores
+        Of the team picture over all instants.
     gospa : (n, 4) float array
         Distance and parts of each instant, see `Gospa`.
+    ospa : (n,) float array [m]
+        Of each instant.
     tracks_started : int
         Different track ids.
     false_tracks : int
@@ -46,77 +53,13 @@ class Following:
     position_error: Floats
     speed_error: Floats
     course_error: Floats
+    position_nees: Floats
     switches: NDArray[np.int64]
+    identity: IdentityScores
     gospa: Floats
+    ospa: Floats
     tracks_started: int
     false_tracks: int
-
-
-class IdentityKeeper:
-    """Matches vehicles with tracks one to one, holds on to the matches, counts the changes.
-
-    CLEAR MOT's correspondence (Bernardin and Stiefelhagen 2008, section 2.1.3): a vehicle keeps
-    the track that it was last matched with while that is within the gate; the others are matched
-    so that as many as possible have a track, and then that the distances sum to the least.
-
-    Parameters
-    ----------
-    vehicles : int
-        How many there are.
-
-    Attributes
-    ----------
-    switches : list of int
-        Per vehicle: how often its match had another id than its last match before, however long
-        ago that was.
-    """
-
-    def __init__(self, vehicles: int) -> None:
-        self.switches = [0] * vehicles
-        self._last: list[int | None] = [None] * vehicles
-
-    def update(self, distances: Floats, codes: list[int]) -> None:
-        """Take in one instant.
-
-        Parameters
-        ----------
-        distances : (k, m) float array [m]
-            From each vehicle to each track.
-        codes : list of m int
-            The tracks' ids, as numbers.
-        """
-        near = distances <= GATE
-        column_of = {code: column for column, code in enumerate(codes)}
-        taken: set[int] = set()
-        free: list[int] = []
-        for vehicle, last in enumerate(self._last):
-            column = None if last is None else column_of.get(last)
-            if column is None or column in taken or not near[vehicle, column]:
-                free.append(vehicle)
-            else:
-                taken.add(column)
-        if len(taken) == len(codes) or not free:
-            return
-        columns = [column for column in range(len(codes)) if column not in taken]
-        open_pairs = np.ix_(free, columns)
-        if near[open_pairs].any():
-            self._match(np.where(near, distances, np.inf)[open_pairs], free, columns, codes)
-
-    def _match(
-        self, distances: Floats, vehicles: list[int], columns: list[int], codes: list[int]
-    ) -> None:
-        from scipy.optimize import linear_sum_assignment
-
-        # A forbidden pair costs more than all allowed ones together, so matches come first.
-        forbidden = GATE * (1 + min(distances.shape))
-        pairs = linear_sum_assignment(np.where(np.isinf(distances), forbidden, distances))
-        for row, column in zip(*(side.tolist() for side in pairs), strict=True):
-            if np.isinf(distances[row, column]):
-                continue
-            vehicle, code = vehicles[row], codes[columns[column]]
-            if self._last[vehicle] is not None and self._last[vehicle] != code:
-                self.switches[vehicle] += 1
-            self._last[vehicle] = code
 
 
 def follow(record: Record) -> Following:
@@ -143,7 +86,8 @@ def follow(record: Record) -> Following:
     near_a_vehicle = np.zeros(len(set(shown_codes)), dtype=bool)
     nearest = np.full((n, k), -1)
     parts = np.zeros((n, 4))
-    keeper = IdentityKeeper(k)
+    numbers = range(k)
+    found = Correspondence(GATE)
     for step in range(n):
         truth = vehicles[step, :, :2].T
         rows = slice(row_bounds[step], row_bounds[step + 1])
@@ -153,16 +97,18 @@ def follow(record: Record) -> Following:
         first, last = picture_bounds[step], picture_bounds[step + 1]
         squares = _squares(truth, shown[:, first:last])
         parts[step] = gospa_of_squares(squares, CUTOFF, ORDER)
+        found.update(np.sqrt(squares), numbers, shown_codes[first:last])
         if squares.size:
             best = squares.argmin(axis=1)
-            found = squares[np.arange(k), best] <= GATE * GATE
-            nearest[step, found] = picture[first + best[found]]
-            keeper.update(np.sqrt(squares), shown_codes[first:last])
+            close = squares[np.arange(k), best] <= GATE * GATE
+            nearest[step, close] = picture[first + best[close]]
     return Following(
         tracked,
         *_errors(tracks, vehicles, nearest),
-        np.array(keeper.switches, dtype=np.int64),
+        np.array([found.switches[vehicle] for vehicle in numbers], dtype=np.int64),
+        scores_of(found),
         parts,
+        ospa_of_gospa(parts, np.maximum(np.diff(picture_bounds), max(k, 1)), ORDER),
         len(near_a_vehicle),
         int((~near_a_vehicle).sum()),
     )
@@ -189,17 +135,28 @@ def _squares(truth: Floats, positions: Floats) -> Floats:
 
 def _errors(
     tracks: NDArray[np.void], vehicles: Floats, nearest: NDArray[np.intp]
-) -> tuple[Floats, Floats, Floats]:
-    """Position, speed and course errors of the tracks in rows `nearest` (-1: none, gives NaN)."""
-    position, speed, course = (np.full(nearest.shape, np.nan) for _ in range(3))
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Position, speed and course errors, and NEES, of the tracks in rows `nearest` (-1: NaN)."""
+    position, speed, course, squared = (np.full(nearest.shape, np.nan) for _ in range(4))
     where = nearest >= 0
     rows, truth = tracks[nearest[where]], vehicles[where]
     vx, vy = truth[:, 3] * np.cos(truth[:, 2]), truth[:, 3] * np.sin(truth[:, 2])
-    position[where] = np.hypot(rows["x"] - truth[:, 0], rows["y"] - truth[:, 1])
+    dx, dy = rows["x"] - truth[:, 0], rows["y"] - truth[:, 1]
+    position[where] = np.hypot(dx, dy)
     speed[where] = np.hypot(rows["vx"], rows["vy"]) - np.abs(truth[:, 3])
     turned = wrap_array(np.arctan2(rows["vy"], rows["vx"]) - np.arctan2(vy, vx))
     course[where] = np.where(np.abs(truth[:, 3]) >= STANDING, turned, np.nan)
-    return position, speed, course
+    squared[where] = _squared(dx, dy, rows["cxx"], rows["cxy"], rows["cyy"])
+    return position, speed, course, squared
+
+
+def _squared(dx: Floats, dy: Floats, xx: Floats, xy: Floats, yy: Floats) -> Floats:
+    """NEES of two dimensions, written out."""
+    determinant = xx * yy - xy * xy
+    squares = yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy
+    definite = (xx > 0.0) & (determinant > 0.0)
+    result: Floats = np.where(definite, squares, np.nan) / np.where(definite, determinant, 1.0)
+    return result
 
 
 def gospa_steps(record: Record) -> Floats:
@@ -216,3 +173,18 @@ def gospa_steps(record: Record) -> Floats:
         ``record.times``; see `staniel.metrics.Gospa`.
     """
     return follow(record).gospa
+
+
+def ospa_steps(record: Record) -> Floats:
+    """OSPA of each decision instant, between all vehicles and the team picture.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    (n,) float array [m]
+        At ``record.times``; see `staniel.metrics.ospa`.
+    """
+    return follow(record).ospa

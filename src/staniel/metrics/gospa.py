@@ -1,9 +1,11 @@
 """How far a set of estimates is from the set of what is there: the GOSPA metric."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from staniel.metrics.checks import checked_cutoff, checked_order, checked_positions
 
 __all__ = ["CUTOFF", "ORDER", "Gospa", "gospa"]
 
@@ -75,13 +77,9 @@ def gospa(
     >>> gospa([[0.0, 0.0], [90.0, 0.0]], [[3.0, 0.0]])
     Gospa(distance=14.45683229480096, localisation=9.0, missed=200.0, false=0.0)
     """
-    x, y = _positions(truth, "truth"), _positions(estimates, "estimates")
-    if not (np.isfinite(cutoff) and cutoff > 0.0):
-        raise ValueError(f"cutoff = {cutoff}: expected a number of metres greater than 0")
-    if not (np.isfinite(order) and order >= 1.0):
-        raise ValueError(f"order = {order}: expected a number of at least 1")
+    x, y = checked_positions(truth, "truth"), checked_positions(estimates, "estimates")
     squares = ((x[:, None, :] - y[None, :, :]) ** 2).sum(axis=2)
-    return gospa_of_squares(squares, cutoff, order)
+    return gospa_of_squares(squares, checked_cutoff(cutoff), checked_order(order))
 
 
 def gospa_of_squares(squares: NDArray[np.float64], cutoff: float, order: float) -> Gospa:
@@ -99,14 +97,3 @@ def gospa_of_squares(squares: NDArray[np.float64], cutoff: float, order: float) 
     missed, false = 0.5 * most * (n - pairs), 0.5 * most * (m - pairs)
     distance = (localisation + missed + false) ** (1.0 / order)
     return Gospa(distance, localisation, missed, false)
-
-
-def _positions(values: ArrayLike, name: str) -> NDArray[np.float64]:
-    array: NDArray[Any] = np.asarray(values, dtype=np.float64)
-    if array.size == 0:
-        array = array.reshape(0, 2)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f"{name} has shape {array.shape}: expected (n, 2)")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} = {array.tolist()}: expected finite numbers")
-    return array

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.metrics.following import Following
+from staniel.metrics.nees import anees
 from staniel.metrics.visible import gaps, sample_step, since, whole_seconds
 from staniel.record import Record
 
@@ -15,7 +16,10 @@ Floats = NDArray[np.float64]
 
 
 def target_metrics(
-    record: Record, following: Following, visible: NDArray[np.bool_]
+    record: Record,
+    following: Following,
+    visible: NDArray[np.bool_],
+    decided_visible: NDArray[np.bool_],
 ) -> list[dict[str, Any]]:
     """The figures of each vehicle, see ``docs/metrics.md``; None where one is undefined.
 
@@ -25,19 +29,25 @@ def target_metrics(
     following : Following
     visible : (m, n_vehicles) bool array
         At ``record.fine_times``.
+    decided_visible : (n, n_vehicles) bool array
+        The same at ``record.times``.
 
     Returns
     -------
     list of dict
     """
     return [
-        _one(record, following, visible[:, vehicle], vehicle)
+        _one(record, following, visible[:, vehicle], decided_visible[:, vehicle], vehicle)
         for vehicle in range(record.vehicles.shape[1])
     ]
 
 
 def _one(
-    record: Record, following: Following, visible: NDArray[np.bool_], vehicle: int
+    record: Record,
+    following: Following,
+    visible: NDArray[np.bool_],
+    decided_visible: NDArray[np.bool_],
+    vehicle: int,
 ) -> dict[str, Any]:
     start = _first_detection(record, vehicle)
     # Without a detection nothing lies "since" it, and every figure of that time is undefined.
@@ -60,6 +70,7 @@ def _one(
         "position_rmse": _rms(following.position_error[decided, vehicle]),
         "speed_rmse": _rms(following.speed_error[decided, vehicle]),
         "course_rmse": _rms(following.course_error[decided, vehicle]),
+        "position_nees": _anees(following.position_nees[decided & decided_visible, vehicle], 2),
         "identity_switches": int(following.switches[vehicle]),
     }
 
@@ -71,6 +82,12 @@ def _first_detection(record: Record, vehicle: int) -> float | None:
 
 def _share(samples: NDArray[np.bool_]) -> float | None:
     return float(samples.mean()) if samples.size else None
+
+
+def _anees(values: Floats, dimension: int) -> float | None:
+    """ANEES of the values that are there (the others are NaN)."""
+    values = values[~np.isnan(values)]
+    return float(anees(values, dimension)) if values.size else None
 
 
 def _rms(errors: Floats) -> float | None:

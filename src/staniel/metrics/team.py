@@ -2,12 +2,14 @@
 
 import itertools
 import statistics
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from staniel.metrics.following import Following
+from staniel.metrics.identity import IdentityScores
 from staniel.metrics.links import link_matrix
 from staniel.record import Record
 
@@ -38,11 +40,14 @@ def team_metrics(
     # A vehicle that was never detected was visible and tracked for nothing of the time.
     visible = [target["visible_fraction"] or 0.0 for target in targets]
     tracked = [target["tracked_fraction"] or 0.0 for target in targets]
+    claims = [nees for target in targets if (nees := target["position_nees"]) is not None]
     return {
         **dict(zip(names, means, strict=True)),
+        "ospa_mean": float(following.ospa.mean()) if len(following.ospa) else None,
         "visible_fraction": statistics.fmean(visible) if visible else None,
         "tracked_fraction": statistics.median(tracked) if tracked else None,
-        "identity_switches": sum(target["identity_switches"] for target in targets),
+        "position_nees": statistics.fmean(claims) if claims else None,
+        **_identity(following.identity),
         "tracks_started": following.tracks_started,
         "false_tracks": following.false_tracks,
         "auctions": len(set(awards[["target", "sender", "sequence"]].tolist())),
@@ -53,6 +58,11 @@ def team_metrics(
         "messages_dropped": len(messages) - len(on_air) if record.aircraft.shape[1] > 1 else None,
         "links": link_matrix(record),
     }
+
+
+def _identity(scores: IdentityScores) -> dict[str, Any]:
+    figures = asdict(scores)
+    return {"identity_switches": figures.pop("switches"), **figures}
 
 
 def handovers(decisions: NDArray[np.void]) -> int:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from staniel.datatypes.truth import CAMERA, FLYING
 from staniel.kernels import unseen as kernels
-from staniel.metrics.following import GATE
+from staniel.metrics.identity import GATE
 from staniel.metrics.picture import id_codes
 from staniel.metrics.visible import sample_step, visible_decisions
 from staniel.record import Record
@@ -93,11 +93,15 @@ def unwatched(record: Record) -> Unwatched:
     -------
     Unwatched
     """
+    return _unwatched(record, visible_decisions(record))
+
+
+def _unwatched(record: Record, visible: NDArray[np.bool_]) -> Unwatched:
     assigned, near = _assignments(record)
     sighted, knows = _told(record, assigned)
     condition = record.condition
     cause = kernels.attribute(
-        visible_decisions(record),
+        visible,
         near,
         assigned,
         (condition[:, :, FLYING] > 0.0) & (condition[:, :, CAMERA] > 0.0),
@@ -108,19 +112,23 @@ def unwatched(record: Record) -> Unwatched:
     return Unwatched(record.times[1:], np.diff(record.times), cause[1:], assigned[1:])
 
 
-def unwatched_metrics(record: Record) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+def unwatched_metrics(
+    record: Record, visible: NDArray[np.bool_]
+) -> tuple[list[dict[str, Any]], dict[str, Any]]:
     """``watched`` and ``unwatched`` [s] of each vehicle, and their sums over the vehicles.
 
     Parameters
     ----------
     record : Record
+    visible : (n, n_vehicles) bool array
+        Of `visible_decisions`.
 
     Returns
     -------
     targets : list of dict
     team : dict
     """
-    totals = unwatched(record).totals
+    totals = _unwatched(record, visible).totals
     return [_figures(row) for row in totals], _figures(totals.sum(axis=0))
 
 

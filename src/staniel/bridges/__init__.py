@@ -1,0 +1,1 @@
+"""Words of other libraries for ours, one module a library: `staniel.bridges.stonesoup`."""
