@@ -108,7 +108,8 @@ def places_at(
     later = now
     slot = head
     while later > time and head - slot < depth[k]:
-        if slot < head and copied[k, slot % SLOTS]:
+        # Of the newest slot only where a step before this one ended at the same time.
+        if copied[k, slot % SLOTS]:
             for i in range(n):
                 index[i] = ancestors[k, slot % SLOTS, index[i]]
         slot -= 1

@@ -80,7 +80,8 @@ def _steer(
 @njit(cache=True, error_model="numpy", inline="always")
 def _built(blocked: Array, frame: Array, x: float, y: float) -> bool:
     """Whether the cell of the chart's raster at (x, y) [m] is built over; nothing is outside it."""
-    column, row = int((x - frame[0]) * frame[2]), int((y - frame[1]) * frame[2])
+    column = math.floor((x - frame[0]) * frame[2])
+    row = math.floor((y - frame[1]) * frame[2])
     inside = (row >= 0) & (row < blocked.shape[0]) & (column >= 0) & (column < blocked.shape[1])
     return bool(inside and blocked[row, column] != 0)
 

@@ -125,7 +125,8 @@ def settle(
         first = step * draws + 2 * half + 1
         if row[8] < threshold * n:
             resample(own, total, scheme, keys[k], first, chosen)
-            if rest[0, 0] <= 0.0:
+            # What is shared of the velocity alone is no reason to jitter, nor to be forgotten.
+            if whole and rest[0, 0] <= 0.0:
                 spread(state[k], own, mean, rest)
                 rest *= roughening * roughening
             for a in range(4):
