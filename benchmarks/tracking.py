@@ -47,12 +47,9 @@ CUTOFF, ORDER = 20.0, 2.0
 PARTS = ("distance", "localisation", "missed", "false")
 OURS = TrackingConfig(
     particles=PARTICLES,
+    dynamics="constant-velocity",
+    acceleration_noise=KNOWN.acceleration**0.5,
     max_speed=FASTEST,
-    turn_noise=0.11,
-    speed_noise=0.3,
-    diffusion=0.05,
-    turn_rate=0.0,
-    restart_rate=0.0,
     detection_probability=KNOWN.detection,
     view_probability=1.0,
     clutter_density=KNOWN.density,
@@ -60,7 +57,7 @@ OURS = TrackingConfig(
     confirmations=3,
     unseen_limit=PATIENCE,
 )
-"""What staniel's tracker is told: as near as its keys come to white acceleration on each axis."""
+"""What staniel's tracker is told: what is true, as its rivals are."""
 
 
 class Ours:

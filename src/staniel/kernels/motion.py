@@ -22,8 +22,8 @@ Array = NDArray[Any]
 CONTROLS, STRAIGHT = range(2)
 """Kinds of motion: controls drawn per particle; straight on, the noise left to the update."""
 
-STRIDE = 8
-"""Moments that only gate and smooth are taken over every eighth particle."""
+SAMPLE = 125
+"""Moments that only gate and smooth are taken over so many particles at least, evenly spaced."""
 
 _F1 = np.float32(1.0)
 _TINY = np.float32(1e-12)
@@ -122,7 +122,7 @@ def _keep_to_streets(
 
 @njit(cache=True, error_model="numpy")
 def spread(state: Array, weights: Array, mean: Array, cov: Array) -> None:
-    """Weighted mean and covariance of every eighth particle, into `mean` and `cov`.
+    """Weighted mean and covariance of evenly spaced particles, into `mean` and `cov`.
 
     Zero where none of these bears weight.
 
@@ -134,8 +134,9 @@ def spread(state: Array, weights: Array, mean: Array, cov: Array) -> None:
     cov : (4, 4) float64 array
     """
     n = weights.size
+    stride = max(n // SAMPLE, 1)
     total, mx, my, mu, mv = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(0, n, STRIDE):
+    for i in range(0, n, stride):
         w = np.float64(weights[i])
         total += w
         mx += w * state[0, i]
@@ -145,7 +146,7 @@ def spread(state: Array, weights: Array, mean: Array, cov: Array) -> None:
     share = 1.0 / total if total > 0.0 else 0.0
     mx, my, mu, mv = mx * share, my * share, mu * share, mv * share
     xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(0, n, STRIDE):
+    for i in range(0, n, stride):
         w = weights[i] * share
         x, y, u, v = state[0, i] - mx, state[1, i] - my, state[2, i] - mu, state[3, i] - mv
         wx, wy, wu = w * x, w * y, w * u
@@ -234,7 +235,7 @@ def predict(
     Returns
     -------
     means : (count, 4) float64 array
-        Of x, y [m, from the origin], vx, vy, over every eighth particle.
+        Of x, y [m, from the origin], vx, vy, over evenly spaced particles.
     covariances : (count, 4, 4) float64 array
     """
     n = state.shape[2]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from staniel.kernels.lanes import exp32, log32
 from staniel.kernels.lineage import SLOTS, places_at
-from staniel.kernels.motion import STRIDE
+from staniel.kernels.motion import SAMPLE
 
 __all__ = ["correct", "warm"]
 
@@ -238,17 +238,18 @@ def _with_the_past(
 def _spread_of_all(planes: Array, weights: Array, mean: Array, cov: Array) -> None:
     """As `staniel.kernels.motion.spread`, of any number of planes."""
     d, n = planes.shape
+    stride = max(n // SAMPLE, 1)
     mean[:], cov[:] = 0.0, 0.0
     total = 0.0
-    for i in range(0, n, STRIDE):
+    for i in range(0, n, stride):
         total += weights[i]
     share = 1.0 / total if total > 0.0 else 0.0
     for a in range(d):
-        for i in range(0, n, STRIDE):
+        for i in range(0, n, stride):
             mean[a] += share * weights[i] * planes[a, i]
     for a in range(d):
         for b in range(a, d):
-            for i in range(0, n, STRIDE):
+            for i in range(0, n, stride):
                 off = (planes[a, i] - mean[a]) * (planes[b, i] - mean[b])
                 cov[a, b] += share * weights[i] * off
             cov[b, a] = cov[a, b]

@@ -2,6 +2,7 @@
 
 from staniel.metrics.compute import compute_metrics
 from staniel.metrics.flown import EXPOSURE_RANGE
+from staniel.metrics.central import central_fusion
 from staniel.metrics.following import gospa_steps, ospa_steps
 from staniel.metrics.gospa import CUTOFF, ORDER, Gospa, gospa
 from staniel.metrics.identity import GATE, IdentityScores, identity_scores
@@ -21,6 +22,7 @@ __all__ = [
     "Ospa",
     "Unwatched",
     "anees",
+    "central_fusion",
     "compute_metrics",
     "consistency_band",
     "gospa",
