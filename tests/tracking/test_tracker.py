@@ -288,6 +288,22 @@ def test_two_targets_side_by_side_in_one_look_stay_two():
 # ---------------------------------------------------------------- names, particles, randomness
 
 
+def test_who_owns_a_sighting_in_whatever_order_they_come():
+    tracker, g = Tracker(rng=5), np.random.default_rng(3)
+    places = [np.array([100.0 * i, 50.0]) for i in range(4)]
+    for k in range(8):
+        sightings = [noisy(g, k, place, reporter=r) for place in places for r in range(2)]
+        sightings = [sightings[i] for i in g.permutation(len(sightings))]
+        tracks = tracker.step(k, sightings)
+    assert len(tracks) == 4
+    for sighting in sightings:
+        nearest = min(tracks, key=lambda track: math.dist(track.position, sighting.position))
+        assert tracker.owner_of(sighting) == nearest.id
+    assert tracker.owner_of(see(k, [0.0, 900.0])) is None
+    tracker.rename(nearest.id, TrackId(-1.0, 9, 9))
+    assert tracker.owner_of(sightings[-1]) == TrackId(-1.0, 9, 9)
+
+
 def test_rename():
     tracker = Tracker(rng=1)
     for k in range(5):

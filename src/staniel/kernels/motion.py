@@ -22,8 +22,8 @@ Array = NDArray[Any]
 CONTROLS, STRAIGHT = range(2)
 """Kinds of motion: controls drawn per particle; straight on, the noise left to the update."""
 
-SAMPLE = 125
-"""Moments that only gate and smooth are taken over so many particles at least, evenly spaced."""
+STRIDE, SAMPLE = 8, 125
+"""Moments that only gate and smooth are taken over every eighth particle, or so many at least."""
 
 _F1 = np.float32(1.0)
 _TINY = np.float32(1e-12)
@@ -134,7 +134,7 @@ def spread(state: Array, weights: Array, mean: Array, cov: Array) -> None:
     cov : (4, 4) float64 array
     """
     n = weights.size
-    stride = max(n // SAMPLE, 1)
+    stride = max(min(n // SAMPLE, STRIDE), 1)
     total, mx, my, mu, mv = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(0, n, stride):
         w = np.float64(weights[i])

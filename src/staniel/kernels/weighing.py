@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from staniel.kernels.lanes import exp32, log32
 from staniel.kernels.lineage import SLOTS, places_at
-from staniel.kernels.motion import SAMPLE
+from staniel.kernels.motion import SAMPLE, STRIDE
 
 __all__ = ["correct", "warm"]
 
@@ -238,7 +238,7 @@ def _with_the_past(
 def _spread_of_all(planes: Array, weights: Array, mean: Array, cov: Array) -> None:
     """As `staniel.kernels.motion.spread`, of any number of planes."""
     d, n = planes.shape
-    stride = max(n // SAMPLE, 1)
+    stride = max(min(n // SAMPLE, STRIDE), 1)
     mean[:], cov[:] = 0.0, 0.0
     total = 0.0
     for i in range(0, n, stride):

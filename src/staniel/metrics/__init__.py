@@ -1,8 +1,8 @@
 """Figures of a run, computed from its record: per vehicle, per aircraft, for the team."""
 
+from staniel.metrics.central import central_fusion
 from staniel.metrics.compute import compute_metrics
 from staniel.metrics.flown import EXPOSURE_RANGE
-from staniel.metrics.central import central_fusion
 from staniel.metrics.following import gospa_steps, ospa_steps
 from staniel.metrics.gospa import CUTOFF, ORDER, Gospa, gospa
 from staniel.metrics.identity import GATE, IdentityScores, identity_scores

@@ -51,8 +51,8 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
     for time, last in zip(record.times.tolist(), until, strict=True):
         sightings = [
             Sighting(
-                row["time"], [row["x"], row["y"]],
-                [[row["cxx"], row["cxy"]], [row["cxy"], row["cyy"]]],
+                row["time"], np.array([row["x"], row["y"]]),
+                np.array([[row["cxx"], row["cxy"]], [row["cxy"], row["cyy"]]]),
                 reporter=int(row["reporter"]),
             )
             for row in rows[first:last]

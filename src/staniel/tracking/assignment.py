@@ -73,13 +73,14 @@ def _nearest(
     pairs: Ints, scores: Floats, open_: Bools, looks: Ints, clutter: float, hit: float
 ) -> Assignment:
     worth = scores > clutter
+    if not open_.any():
+        return _owned(pairs, worth, looks.size)
     taken = worth & ~open_
     left = np.flatnonzero(worth & open_)
-    if left.size:
-        look_of = looks[pairs[left, 1]]
-        for look in np.unique(look_of).tolist():
-            mine = left[look_of == look]
-            taken[mine[_best(pairs[mine], scores[mine] - clutter)]] = True
+    look_of = looks[pairs[left, 1]]
+    for look in np.unique(look_of).tolist():
+        mine = left[look_of == look]
+        taken[mine[_best(pairs[mine], scores[mine] - clutter)]] = True
     return _owned(pairs, taken, looks.size)
 
 

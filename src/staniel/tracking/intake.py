@@ -32,7 +32,7 @@ class Batch:
     looks : (m,) int64 array
         Number of the look (reporter and time) that each belongs to, from 0.
     times : list of float [s]
-    keys : list
+    keys : list of Key
         By which a copy of each is recognised.
     """
 
@@ -99,5 +99,5 @@ def _batch(fresh: dict[Key, tuple[float, float, float, float, float, float, int]
         np.ascontiguousarray(table[:, :6]),
         np.array(looks, np.int64),
         [row[0] for row in rows],
-        list(fresh),
+        [(row[6], row[0], row[1], row[2]) for row in rows],
     )
