@@ -41,7 +41,7 @@ def rivals_of(p, pairs, looks):
 
 
 def owned(rule, pairs, scores, looks):
-    open_ = contested(pairs, looks, int(pairs[:, 0].max()) + 1 if len(pairs) else 0)
+    open_ = contested(pairs, looks)
     return assign(rule, pairs, scores, open_, looks, CLUTTER, HIT)
 
 
@@ -50,7 +50,7 @@ def owned(rule, pairs, scores, looks):
 def test_contested_is_who_has_a_rival(problem):
     pairs, _, looks = problem
     expected = [bool(rivals_of(p, pairs, looks)) for p in range(len(pairs))]
-    assert contested(pairs, looks, 4).tolist() == expected
+    assert contested(pairs, looks).tolist() == expected
 
 
 # ---------------------------------------------------------------- particles

@@ -167,16 +167,17 @@ def test_nothing_moves_when_time_stands_still():
         assert not clouds.depth.any()
 
 
-def test_spread_is_that_of_every_eighth_particle():
+@pytest.mark.parametrize(("n", "stride"), [(50, 1), (124, 1), (403, 3), (1000, 8), (9001, 8)])
+def test_spread_is_that_of_every_eighth_particle_or_of_enough(n, stride):
     g = np.random.default_rng(1)
-    state = g.normal(3.0, 5.0, (4, 403)).astype(np.float32)
-    weights = g.random(403).astype(np.float32)
+    state = g.normal(3.0, 5.0, (4, n)).astype(np.float32)
+    weights = g.random(n).astype(np.float32)
     mean, cov = np.empty(4), np.empty((4, 4))
     spread(state, weights, mean, cov)
-    own, w = state[:, ::8].astype(float), weights[::8].astype(float)
+    own, w = state[:, ::stride].astype(float), weights[::stride].astype(float)
     np.testing.assert_allclose(mean, own @ w / w.sum(), rtol=1e-6)
     np.testing.assert_allclose(cov, np.cov(own, aweights=w, ddof=0), rtol=1e-6)
-    weights[::8] = 0.0
+    weights[::stride] = 0.0
     spread(state, weights, mean, cov)
     assert not mean.any()
     assert not cov.any()
