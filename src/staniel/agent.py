@@ -15,7 +15,7 @@ from staniel.city import City
 from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMap, Task
 from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import Command, FlyBanks, FlyLine
+from staniel.datatypes.command import Command, FlyBanks, FlyLine, look_point
 from staniel.datatypes.equipment import Airframe, Camera, Lidar
 from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
@@ -100,6 +100,7 @@ class Agent:
         )
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
+        self._look: Point = (math.nan, math.nan)
         self.belief = Belief((), "search", None, (0.0, 0.0))
 
     def step(self, percept: Percept, inbox: Sequence[Message]) -> tuple[Command, list[Message]]:
@@ -126,6 +127,7 @@ class Agent:
         outbox = self._allocate(percept, tracks, inbox)
         command, role, goal = self._fly(time, pose, inbox, outbox)
         command, guard = self._avoid(percept, inbox, command)
+        self._look = look_point(command)
         if percept.sightings:
             outbox.append(
                 Report(self.id, self._allocation.next_sequence(), time, sightings=percept.sightings)
@@ -275,6 +277,7 @@ class Agent:
                 )
                 for beat in self._helping.partners(track.id)
             ),
+            look=self._look,
             memory=self._memory,
         )
 
