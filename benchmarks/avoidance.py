@@ -49,11 +49,16 @@ class Outcome:
     low: float
 
 
-def scenario_of(number: int, policy: str, minutes: float) -> Scenario:
+def layered(number: int) -> bool:
+    """Whether the aircraft of the mission of this number fly in layers: every other two do."""
+    return number // 2 % 2 == 1
+
+
+def scenario_of(number: int, policy: str, minutes: float, pursuit: str = "carrot") -> Scenario:
     """The mission of this number: its city, team, radio and no-fly regions are drawn by it."""
     rng = np.random.default_rng([number, 4711])
     size = float(rng.choice([400.0, 500.0, 600.0]))
-    loss, spacing = 0.5 * (number % 2), LAYER * (number // 2 % 2)
+    loss, spacing = 0.5 * (number % 2), LAYER if layered(number) else 0.0
     density = float(rng.choice([0.2, 0.35, 0.5]))
     changes: dict[str, Any] = {
         "name": "avoidance",
@@ -72,7 +77,7 @@ def scenario_of(number: int, policy: str, minutes: float) -> Scenario:
             "aperture_deg": float(rng.choice([180.0, 270.0, 360.0])),
         },
         "radio.loss": loss,
-        "guidance": {"avoidance": policy, "layer_spacing": spacing},
+        "guidance": {"avoidance": policy, "layer_spacing": spacing, "pursuit": pursuit},
         "aircraft": {"count": int(rng.integers(2, 7))},
     }
     first = load_scenario("downtown", **changes, **{"aircraft.altitude": 500.0})
@@ -103,9 +108,9 @@ def _regions(rng: np.random.Generator, size: float, starts: np.ndarray) -> list[
     return regions
 
 
-def fly(number: int, policy: str, minutes: float) -> Outcome:
+def fly(number: int, policy: str, minutes: float, pursuit: str = "carrot") -> Outcome:
     """Fly one mission and count, at every dynamics step of the true paths."""
-    scenario = scenario_of(number, policy, minutes)
+    scenario = scenario_of(number, policy, minutes, pursuit)
     city = build_city(scenario.city, number)
     mission = assemble(scenario, city)
     paths, guards = [], []
@@ -138,7 +143,7 @@ def fly(number: int, policy: str, minutes: float) -> Outcome:
     )
 
 
-def _fly(task: tuple[int, str, float]) -> Outcome:
+def _fly(task: tuple[int, str, float, str]) -> Outcome:
     return fly(*task)
 
 
@@ -184,14 +189,18 @@ def main() -> None:
     parser.add_argument(
         "--policy", default="predictive", choices=["predictive", "saunders", "none"]
     )
+    parser.add_argument("--pursuit", default="carrot", help="pursuit policy")
+    parser.add_argument("--layered", action="store_true", help="only those with layers")
     parser.add_argument("--processes", type=int, default=multiprocessing.cpu_count())
     parser.add_argument("--log", type=Path, help="each outcome, as a line of JSON")
     arguments = parser.parse_args()
-    warm_all(lambda done, total: None, ["lidar", "risk", "threats", "occupancy", "avoidance"])
+    kernels = ["lidar", "risk", "threats", "occupancy", "avoidance", "outlook", "lookahead"]
+    warm_all(lambda done, total: None, kernels)
     started = time.perf_counter()
     tasks = [
-        (number, arguments.policy, arguments.minutes)
+        (number, arguments.policy, arguments.minutes, arguments.pursuit)
         for number in range(arguments.first, arguments.first + arguments.missions)
+        if layered(number) or not arguments.layered
     ]
     with multiprocessing.get_context("fork").Pool(arguments.processes) as pool:
         outcomes = []

@@ -16,7 +16,7 @@ from staniel.city import City
 from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMap, Task
 from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import Command, FlyBanks, FlyLine
+from staniel.datatypes.command import Command, FlyBanks, FlyLine, look_point
 from staniel.datatypes.equipment import Airframe, Camera, Lidar
 from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
@@ -103,6 +103,7 @@ class Agent:
         )
         self._last_place: tuple[Point, float] | None = None
         self._seen_holding = -math.inf
+        self._look: Point = (math.nan, math.nan)
         self.belief = Belief((), "search", None, (0.0, 0.0))
 
     def step(self, percept: Percept, inbox: Sequence[Message]) -> tuple[Command, list[Message]]:
@@ -129,6 +130,7 @@ class Agent:
         outbox = self._allocate(percept, tracks, inbox)
         command, role, goal = self._fly(time, pose, inbox, outbox)
         command, guard = self._avoid(percept, inbox, command)
+        self._look = look_point(command)
         if percept.sightings:
             outbox.append(
                 Report(
@@ -179,14 +181,14 @@ class Agent:
 
     def _coverage(self, percept: Percept) -> list[Coverage] | None:
         """What the own camera has just looked at; not known of one whose pictures come late."""
-        camera, pose, goal = self._briefing.camera, percept.pose, self.belief.goal
+        camera, pose, aim = self._briefing.camera, percept.pose, self._look
         if camera.delay > 0.0:
             return None
 
         def shows(places: NDArray[np.float64]) -> NDArray[np.bool_]:
             eye, points = np.array([pose]), np.empty((len(places), 3))
             points[:, :2], points[:, 2] = places, camera.target_height
-            axes = camera_axes(eye, np.array([goal]), camera.mounting)
+            axes = camera_axes(eye, np.array([aim]), camera.mounting)
             walls = self._briefing.chart.walls
             seen: NDArray[np.bool_] = look(
                 walls, eye, axes, points, camera.half_aperture, camera.range
@@ -312,6 +314,7 @@ class Agent:
                 )
                 for beat in self._helping.partners(track.id)
             ),
+            look=self._look,
             memory=self._memory,
         )
 

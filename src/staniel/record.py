@@ -172,7 +172,7 @@ class Record:
         ends = np.full((len(self.times) + 1, self.aircraft.shape[1], 2), np.nan)
         rows = self.commands[self.commands["agent"] < ends.shape[1]]
         decided = np.searchsorted(self.times, rows["time"] - _SAME)
-        line = (rows["kind"] == "line")[:, None]
+        line = (rows["kind"] == "line")[:, None]  # Others have their point, if any, in the first.
         first = np.stack([rows["ax"], rows["ay"]], axis=1)
         second = np.stack([rows["bx"], rows["by"]], axis=1)
         # Row 0 stands for the time before any command; a decision rules what comes after it.

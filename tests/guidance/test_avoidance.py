@@ -9,7 +9,7 @@ from flown import Flown
 
 from staniel.city import City
 from staniel.datatypes.belief import Pose
-from staniel.datatypes.command import FlyLine, FlyOrbit
+from staniel.datatypes.command import FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import Airframe
 from staniel.datatypes.risk import RiskRegion
 from staniel.guidance import GuidanceConfig
@@ -268,6 +268,24 @@ def test_an_unsafe_command_of_any_kind_is_replaced():
     into = FlyOrbit((415.0, 500.0), 45.0, 1, 15.0, Z)  # round the wall's middle
     run = Flown([east(200.0)], [into], city=WALL).run(60)
     assert run.strikes == 0
+
+
+def test_where_a_gimbal_looks_steers_nothing_and_stays_with_other_banks():
+    def run(look):
+        wanted = FlyBanks((0.0,), 1.0, 15.0, Z, look)
+        return Flown([east(300.0), east(600.0, heading=math.pi)], [wanted] * 2).run(25)
+
+    aside, ahead = run((300.0, 900.0)), run((450.0, 500.0))
+    assert np.array_equal(aside.path, ahead.path)
+    replaced = [
+        command
+        for commands, guards in zip(aside.flown, aside.guards, strict=True)
+        for command, guard in zip(commands, guards, strict=True)
+        if guard
+    ]
+    banks = [command for command in replaced if isinstance(command, FlyBanks)]
+    assert len(replaced) > len(banks) > 0
+    assert {command.look for command in banks} == {(300.0, 900.0)}
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The policies orbit and lookahead, and the loiter where no flight is safe, from outside."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -37,14 +38,18 @@ def pursuit(pose, target=(300.0, 300.0), chart=OPEN, time=10.0, last_seen=10.0, 
     particles = np.concatenate(
         (target + rng.normal(0.0, 2.0, (300, 2)), np.zeros((300, 2))), axis=1
     )
-    usual = {"airframe": Airframe(altitude=pose[2]), "memory": {}, "config": GuidanceConfig()}
+    usual = {
+        "airframe": Airframe(altitude=pose[2]),
+        "camera": Camera(),
+        "memory": {},
+        "config": GuidanceConfig(),
+    }
     return Pursuit(
         time=time,
         pose=Pose(*pose),
         track=track,
         waypoint=np.array(target),
         cloud=lambda: (particles, np.full(300, 1.0 / 300.0)),
-        camera=Camera(),
         chart=chart,
         **(usual | others),
     )
@@ -106,6 +111,41 @@ def test_the_same_pursuit_gives_the_same_command_and_the_rest_of_a_plan_is_kept(
     assert first == second
     assert len(first.banks) == min(GuidanceConfig().lookahead.horizon, MAX_BANKS)
     assert all(abs(bank) <= Airframe().max_bank + 1e-12 for bank in first.banks)
+
+
+def test_a_gimbal_is_led_to_where_the_target_will_be():
+    drive = np.concatenate(
+        (np.full((300, 2), 300.0), np.tile(np.array([[4.0, 0.0]]), (300, 1))), axis=1
+    )
+    begin = (250.0, 300.0, 50.0, 0.0, 0.0, 15.0)
+    cloud = (drive, np.full(300, 1.0 / 300.0))
+    look = lookahead(dataclasses.replace(pursuit(begin), cloud=lambda: cloud)).look
+    # The mean of the coming second's two instants, 0.5 and 1 s ahead.
+    assert look == pytest.approx((303.0, 300.0))
+
+
+def test_a_look_in_vain_of_a_gimbal_counts_where_it_looked():
+    """What it saw to be empty is where no flight goes to look; a body-fixed camera has no point."""
+    camera = Camera(mount="gimbal", half_aperture_deg=15.0, gimbal_limit_deg=70.0)
+    begin = (300.0, 300.0, 60.0, 0.0, 0.0, 15.0)
+
+    def next_look(look, **changes):
+        now = pursuit(begin, (300.0, 300.0), time=11.0, camera=camera, look=look, **changes)
+        west = np.tile(np.array([[260.0, 300.0, 0.0, 0.0]]), (150, 1))
+        east = west + np.array([80.0, 0.0, 0.0, 0.0])
+        cloud = np.concatenate((west, east))
+        both = lambda: (cloud, np.full(300, 1.0 / 300.0))  # noqa: E731
+        return lookahead(dataclasses.replace(now, cloud=both)).look[0]
+
+    assert next_look((260.0, 300.0)) > 325.0
+    assert next_look((340.0, 300.0)) < 275.0
+    # A partner says where it looks with its plan; one that does not has seen nothing for certain.
+    plan = FlyBanks((0.0,), 1.0, 15.0, 60.0, look=(260.0, 300.0))
+    elsewhere = (300.0, 420.0)
+    partner = Partner(11.0, Pose(300.0, 310.0, 60.0, 0.0, 0.0, 15.0), plan)
+    assert next_look(elsewhere, partners=(partner,)) > 325.0
+    silent = dataclasses.replace(partner, plan=None)
+    assert next_look(elsewhere, partners=(silent,)) == pytest.approx(300.0, abs=6.0)
 
 
 def test_a_partner_that_has_the_target_in_sight_makes_room_for_another_flight():
@@ -170,6 +210,19 @@ def test_a_pair_that_looks_ahead_sees_more_than_a_pair_that_chases():
     assert more.mean() - 2.0 * more.std(ddof=1) / math.sqrt(len(more)) > 0.1
     chase, look = shares.mean(axis=0)
     assert 1.0 - look < 0.65 * (1.0 - chase)
+
+
+def test_a_gimbal_sees_what_it_pursues_far_longer_than_a_camera_fixed_to_the_body():
+    """With the same aperture, of the time that anybody pursues."""
+    for seed in (3, 6, 9):
+        shares = []
+        for camera in ({"mount": "body"}, {"mount": "gimbal", "gimbal_limit_deg": 60.0}):
+            camera = {"half_aperture_deg": 45.0, **camera}
+            frames = flown(4.0, seed=seed, camera=camera, guidance={"pursuit": "lookahead"})
+            pursued = [f for f in frames if any(b.role == "pursue" for b in f.beliefs)]
+            assert len(pursued) > 60
+            shares.append(np.mean([any(0 in o for o in frame.origins) for frame in pursued]))
+        assert shares[1] > shares[0] + 0.25
 
 
 def test_a_helper_joins_by_message_and_two_runs_are_the_same():

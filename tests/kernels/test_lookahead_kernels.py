@@ -6,8 +6,10 @@ import math
 import numpy as np
 import pytest
 import shapely
+from scipy.spatial.transform import Rotation
 
 from staniel.city import City
+from staniel.datatypes.equipment import Camera
 from staniel.kernels.flight import BANKS, COMMAND_WIDTH, fly
 from staniel.kernels.footprint import BODY
 from staniel.kernels.forecast import discredit, forecast
@@ -72,19 +74,35 @@ def hidden(city, eye, point):
     return False
 
 
-def in_view(pose, point, half_aperture=EYE.half_aperture, reach=EYE.reach):
+def in_view(pose, point, half_aperture=EYE.half_aperture, reach=EYE.reach, axis=None):
     way = np.asarray(point) - pose[:3]
     distance = np.linalg.norm(way)
-    cosine = way @ axis_of(pose[3], pose[4]) / distance
-    return distance <= reach and math.acos(min(1.0, cosine)) <= half_aperture
+    axis = axis_of(pose[3], pose[4]) if axis is None else axis
+    return distance <= reach and math.acos(min(1.0, way @ axis / distance)) <= half_aperture
+
+
+def gimbal_axis(pose, point, limit):
+    """Towards a point on the ground, or turned towards it by the limit from body-down."""
+    down = axis_of(pose[3], pose[4])
+    wish = np.array([*point, 0.0]) - pose[:3]
+    wish /= np.linalg.norm(wish)
+    if math.acos(np.clip(wish @ down, -1.0, 1.0)) <= limit:
+        return wish
+    normal = np.cross(down, wish)
+    return Rotation.from_rotvec(normal / np.linalg.norm(normal) * limit).apply(down)
+
+
+def gimbal(half_aperture_deg=25.0, limit_deg=40.0):
+    camera = Camera(mount="gimbal", gimbal_limit_deg=limit_deg)
+    return Eye(camera.mounting, math.radians(half_aperture_deg), EYE.reach)
 
 
 NO_HOPE = Outlook(np.zeros((SIZE, SIZE, 5)), LIMIT, 1.0)
 """After its end a flight is worth nothing."""
 
 
-def search(banks=(-LIMIT, 0.0, LIMIT), **changes):
-    moves = new_moves(np.array(banks), SPEED, ROLL_GAIN, ROLL_RATE, 0.5, 2, BODY)
+def search(banks=(-LIMIT, 0.0, LIMIT), eye=EYE, **changes):
+    moves = new_moves(np.array(banks), SPEED, ROLL_GAIN, ROLL_RATE, 0.5, 2, eye.mount)
     usual = Search(moves, 3, 2, 0.5, ROLL_GAIN, ROLL_RATE, 200, 0.9, 0.0, 0, NO_HOPE)
     return usual._replace(**changes)
 
@@ -192,15 +210,24 @@ def test_looks_in_vain_take_weight_from_what_they_would_have_shown():
     rng, n = np.random.default_rng(4), 200
     cloud = np.concatenate((rng.uniform(0.0, 300.0, (n, 2)), rng.normal(0.0, 1.0, (n, 2))), axis=1)
     weights = np.full(n, 1.0 / n)
-    looks = np.array([[7.0, 100.0, 100.0, 60.0, 0.3, 0.4], [9.0, 180.0, 90.0, 60.0, 1.0, -0.2]])
-    expected = weights.copy()
-    for look in looks:
-        for i in range(n):
-            place = cloud[i, :2] - (10.0 - look[0]) * cloud[i, 2:]
-            expected[i] *= 0.1 if in_view(look[1:], (*place, 1.0)) else 1.0
-    discredit(OPEN.walls, cloud, weights, 10.0, looks, BODY, 1.0, *EYE[1:], 0.1)
-    np.testing.assert_allclose(weights, expected / expected.sum(), rtol=1e-9)
-    assert len(np.unique(np.round(weights / weights.max(), 6))) == 3
+    looks = np.array(
+        [
+            [7.0, 100.0, 100.0, 60.0, 0.3, 0.4, 70.0, 160.0],
+            [9.0, 180.0, 90.0, 60.0, 1.0, -0.2, 180.0, 120.0],
+        ]
+    )
+    for eye in (EYE, gimbal(40.0, 50.0)):
+        expected, left = weights.copy(), weights.copy()
+        for look in looks:
+            swings = eye is not EYE
+            axis = gimbal_axis(look[1:], look[6:], math.radians(50.0)) if swings else None
+            for i in range(n):
+                place = cloud[i, :2] - (10.0 - look[0]) * cloud[i, 2:]
+                seen = in_view(look[1:], (*place, 1.0), eye.half_aperture, axis=axis)
+                expected[i] *= 0.1 if seen else 1.0
+        discredit(OPEN.walls, cloud, left, 10.0, looks, eye.mount, 1.0, *eye[1:], 0.1)
+        np.testing.assert_allclose(left, expected / expected.sum(), rtol=1e-9)
+        assert len(np.unique(np.round(left / left.max(), 6))) == 3
 
 
 def test_a_search_finds_what_trying_every_sequence_finds():
@@ -229,6 +256,54 @@ def test_a_search_finds_what_trying_every_sequence_finds():
             places, weights, np.zeros(3),
         )[1]  # fmt: skip
         assert polished >= value
+
+
+@pytest.mark.parametrize("limit", [20.0, 60.0])
+def test_a_gimbal_is_scored_by_its_own_axis(limit):
+    """It looks at the mean of the places at each instant, within its swing."""
+    rng, eye = np.random.default_rng(11), gimbal(25.0, limit)
+    far, near = 0, 0
+    for _ in range(6):
+        start = np.array([300.0, 300.0, 50.0, rng.uniform(-3, 3), rng.uniform(-0.5, 0.5), SPEED])
+        cluster = rng.uniform(240.0, 360.0, 2) + rng.uniform(-30.0, 30.0, (5, 2))
+        places = cluster + 3.0 * np.arange(7)[:, None, None]
+        weights = np.tile(rng.uniform(0.1, 0.3, (1, 5)), (7, 1))
+
+        def worth(banks, start=start, places=places, weights=weights):
+            total = 0.0
+            for t, pose in enumerate(flown(start, banks)[1:], start=1):
+                axis = gimbal_axis(pose, places[t].mean(axis=0), math.radians(limit))
+                seen = [in_view(pose, (*p, 1.0), eye.half_aperture, axis=axis) for p in places[t]]
+                total += 0.9 ** (0.5 * t) * 0.5 * (weights[t] @ seen)
+            return total
+
+        best = max(worth(banks) for banks in itertools.product((-LIMIT, 0.0, LIMIT), repeat=3))
+        for polish in (0, 2):
+            banks, value = plan(
+                OPEN.walls, new_sightlines(50.0, 1.0), eye,
+                search(eye=eye, polish=polish), *no_regions(), start, places, weights, np.zeros(3),
+            )  # fmt: skip
+            assert value == pytest.approx(worth(banks), abs=0.06)
+            assert value >= best - 0.06
+        far, near = far + (best > 0.0), near + (best < 2.0)
+    assert far > 0
+    assert near > 0
+
+
+def test_the_outlook_of_a_gimbal_ends_where_its_swing_and_cone_do():
+    """Level and far away, what it may hope for is what its limit lets it see."""
+    narrow, wide = (
+        new_outlook(
+            gimbal(25.0, limit), np.ones(RINGS), 50.0, SPEED, LIMIT * np.linspace(-1.0, 1.0, 5),
+            ROLL_GAIN, ROLL_RATE, 0.5, 2, 0.9,
+        )
+        for limit in (20.0, 60.0)
+    )  # fmt: skip
+    # Seen for ever: the sum of 0.9^t over half seconds. It keeps a target in a cone of 85 degrees.
+    always = 0.5 / (0.9**-0.5 - 1.0)
+    assert outlook(wide, 0.0, 0.0, 0.0) == pytest.approx(always, rel=0.01)
+    assert outlook(narrow, 0.0, 0.0, 0.0) < 0.8 * always
+    assert (wide.values >= narrow.values - 1e-9).all()
 
 
 def crossing(regions, rates, city=OPEN, start=(100.0, 300.0, 30.0, 0.0, 0.0, SPEED), holds=8):
@@ -282,6 +357,15 @@ def test_what_a_partner_sees_counts_for_little():
             assert weights[t, j] == pytest.approx(0.05 if seen else 0.5)
     assert 0.05 < weights[:, 0].mean() < 0.5
     assert (weights[:, 1] == 0.5).all()
+    eye, weights = gimbal(20.0, 30.0), np.full((13, 2), 0.5)
+    places = np.tile(np.array([[[90.0, 0.0], [70.0, 20.0]]]), (13, 1, 1))
+    shade(OPEN.walls, eye, poses, places, weights, 1.0, 0.9)
+    for t, pose in enumerate(poses):
+        axis = gimbal_axis(pose, places[t].mean(axis=0), math.radians(30.0))
+        for j in range(2):
+            seen = in_view(pose, (*places[t, j], 1.0), eye.half_aperture, axis=axis)
+            assert weights[t, j] == pytest.approx(0.05 if seen else 0.5)
+    assert set(np.round(weights.ravel(), 9)) == {0.05, 0.5}
 
 
 @pytest.mark.parametrize("seed", range(3))

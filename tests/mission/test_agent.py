@@ -10,17 +10,18 @@ from staniel.city import City
 from staniel.cooperation import CooperationConfig
 from staniel.datatypes.belief import Percept, Pose, Sighting
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import FlyLine, FlyOrbit
+from staniel.datatypes.command import FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Announce, Award, Heartbeat, Release, Report
 from staniel.guidance import GuidanceConfig
 from staniel.tracking import TrackingConfig
 
 GUIDANCE = GuidanceConfig()
+CHASING = GuidanceConfig(pursuit="carrot")
 SIGMA = np.eye(2) * 1.5**2
 
 
-def agent_of(number=0):
+def agent_of(number=0, guidance=GUIDANCE):
     briefing = Briefing(
         chart=City.open((600.0, 600.0)),
         clock=Clock(),
@@ -28,7 +29,7 @@ def agent_of(number=0):
         camera=Camera(),
         tracking=TrackingConfig(),
         cooperation=CooperationConfig(),
-        guidance=GUIDANCE,
+        guidance=guidance,
     )
     return Agent(number, briefing, np.random.default_rng(3))
 
@@ -50,15 +51,19 @@ def said(outbox, kind):
     return [message for message in outbox if isinstance(message, kind)]
 
 
-@pytest.fixture
-def holder():
+def found(agent):
     """An agent that found a vehicle by itself and was awarded it by its own auction."""
-    agent, log = agent_of(), []
+    log = []
     for k in range(12):
         command, outbox = agent.step(percept(k, see(k)), [])
         log += outbox
     assert agent.belief.role == "pursue"
     return agent, log, command
+
+
+@pytest.fixture
+def holder():
+    return found(agent_of())
 
 
 def test_a_lone_finder_announces_awards_itself_and_holds(holder):
@@ -72,16 +77,33 @@ def test_a_lone_finder_announces_awards_itself_and_holds(holder):
     assert len(said(log, Heartbeat)) == len(said(log, Report)) == 12
 
 
-def test_pursuit_flies_to_the_prediction_three_steps_ahead(holder):
+def test_the_default_looks_ahead_and_says_what_it_flies(holder):
+    agent, log, command = holder
+    assert agent.belief.role == "pursue"
+    assert isinstance(command, FlyBanks)
+    assert command.look == pytest.approx(place(11.75), abs=3.0)
+    assert said(log, Heartbeat)[-1].command == command
+
+
+def test_a_policy_is_told_where_the_gimbal_looked_until_now(holder):
     agent, _, command = holder
+    told, policy = [], agent._pursue
+    agent._pursue = lambda pursuit: told.append(pursuit.look) or policy(pursuit)
+    after, _ = agent.step(percept(12, see(12)), [])
+    agent.step(percept(13, see(13)), [])
+    assert told == [command.look, after.look]
+
+
+def test_the_carrot_flies_to_the_prediction_three_steps_ahead():
+    agent, _, command = found(agent_of(guidance=CHASING))
     (track,) = agent.belief.tracks
     assert isinstance(command, FlyLine)
     assert command.end == pytest.approx(tuple(track.position + 3.0 * track.velocity))
     assert command.end == pytest.approx(place(11 + 3), abs=5.0)
 
 
-def test_pursuit_circles_when_close(holder):
-    agent, _, _ = holder
+def test_the_carrot_circles_when_close():
+    agent, _, _ = found(agent_of(guidance=CHASING))
     above = Pose(place(12)[0] - 30.0, place(12)[1], 80.0, 0.0, 0.0, 15.0)
     command, _ = agent.step(percept(12, see(12), pose=above), [])
     assert isinstance(command, FlyOrbit)

@@ -102,21 +102,28 @@ def test_the_record_says_what_avoidance_did(tmp_path):
     assert run.metrics["aircraft"][0]["building_strikes"] == 0
 
 
-def test_who_says_what_it_flies_says_more(tmp_path):
-    """A heartbeat carries the command only where somebody avoids others by it."""
-    for avoidance in ("none", "predictive"):
-        scenario = load_scenario(
-            "village", **{"guidance.avoidance": avoidance, "minutes": 0.1, "aircraft.count": 2}
-        )
-        frames = list(assemble(scenario, build_city(scenario.city, 0)).frames())
-        said = [
+def test_who_says_what_it_flies_says_more():
+    """A heartbeat carries the command only where somebody avoids others by it, or it is a plan."""
+
+    def said(avoidance, pursuit):
+        guidance = {"avoidance": avoidance, "pursuit": pursuit}
+        changes = {"guidance": guidance, "minutes": 0.5, "aircraft.count": 2}
+        scenario = load_scenario("village", **changes)
+        return [
             delivery.message
-            for frame in frames
+            for frame in assemble(scenario, build_city(scenario.city, 0)).frames()
             for delivery in frame.deliveries
             if delivery.message.kind == "heartbeat"
         ]
-        assert said
-        assert {message.command is None for message in said} == {avoidance == "none"}
+
+    chasing, planning = said("none", "carrot"), said("none", "lookahead")
+    assert {message.role for message in chasing} >= {"search", "pursue"}
+    assert all(message.command is None for message in chasing)
+    assert {message.role for message in planning} >= {"search", "pursue"}
+    for message in planning:
+        assert (message.command is not None) == (message.role == "pursue")
+    for pursuit in ("carrot", "lookahead"):
+        assert all(message.command is not None for message in said("predictive", pursuit))
 
 
 def test_the_reactive_rival_flies(random_missions):

@@ -119,10 +119,26 @@ def test_without_a_radio_a_sensor_changes_nobodys_flight():
     def paths(scenario):
         return np.array([frame.truth.aircraft for frame in ready(scenario).frames()])
 
-    silent = {"radio.range": 0.0}
+    silent = {"radio.range": 0.0, "guidance.pursuit": "carrot"}
     assert np.array_equal(
         paths(dangerous(**silent)), paths(dangerous(**silent, **{"risk.sensor": {}}))
     )
+
+
+def test_who_looks_ahead_flies_by_what_it_noticed_and_not_before():
+    silent = {"radio.range": 0.0, "guidance.pursuit": "lookahead"}
+    sensed = list(ready(dangerous(**silent)).frames())
+    blind = list(ready(dangerous(**silent, **{"risk.sensor": {}})).frames())
+    changed = 0
+    for agent in range(3):
+        noticed = [bool(frame.percepts[agent].threats) for frame in sensed].index(True)
+        apart = [
+            not np.array_equal(a.truth.aircraft[agent], b.truth.aircraft[agent])
+            for a, b in zip(sensed, blind, strict=True)
+        ]
+        assert not any(apart[: noticed + 1])
+        changed += any(apart)
+    assert changed > 0
 
 
 def test_the_sensor_does_not_touch_the_other_streams():

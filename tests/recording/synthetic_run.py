@@ -172,7 +172,8 @@ def _belief(truth, agent, tracks, rng):
 
 def _command(agent, tick, goal):
     if tick % 7 == 0:
-        return FlyBanks((0.1, -0.2, 0.0), 1.5, 15.0, 80.0)
+        look = goal if tick % 2 else None
+        return FlyBanks((0.1, -0.2, 0.0), 1.5, 15.0, 80.0, look)
     if (tick + agent) % 2:
         return FlyOrbit(goal, 40.0, -1 if agent % 2 else 1, 15.0, 80.0)
     return FlyLine((goal[0] - 50.0, goal[1]), goal, 15.0, 80.0)

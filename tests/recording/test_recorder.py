@@ -16,6 +16,7 @@ from mcap.reader import make_reader
 
 from staniel.city import City
 from staniel.datatypes.clock import Clock
+from staniel.datatypes.command import FlyBanks
 from staniel.datatypes.message import Award, Heartbeat, Report
 from staniel.datatypes.risk import RiskRegion
 from staniel.datatypes.threats import Carrier, Threats
@@ -148,7 +149,11 @@ def test_commands_and_decisions_come_back(path, frames):
             assert [row["ax"], row["ay"]] == pytest.approx(command.center, abs=0.0006)
             assert (row["radius"], row["turn"]) == (command.radius, command.turn)
         else:
-            assert all(math.isnan(row[name]) for name in ("ax", "ay", "bx", "by", "radius"))
+            look = (math.nan, math.nan) if command.look is None else command.look
+            assert [row["ax"], row["ay"]] == pytest.approx(look, abs=0.0006, nan_ok=True)
+            assert all(math.isnan(row[name]) for name in ("bx", "by", "radius"))
+    banks = [command for command in commands if isinstance(command, FlyBanks)]
+    assert {command.look is None for command in banks} == {False, True}
     beliefs = [belief for frame in frames for belief in frame.beliefs]
     assert back.decisions["role"].tolist() == [belief.role for belief in beliefs]
     targets = ["" if belief.target is None else str(belief.target) for belief in beliefs]

@@ -24,7 +24,7 @@ def test_downtown_is_the_stated_mission():
     assert (downtown.minutes, downtown.clock.decision_step) == (10.0, 1.0)
     assert downtown.clock.dynamics_step == 0.1
     assert downtown.tracking.particles == 1000
-    assert (downtown.chart, downtown.guidance.pursuit) == ("known", "carrot")
+    assert (downtown.chart, downtown.guidance.pursuit) == ("known", "lookahead")
 
 
 def test_the_defaults_of_the_model_are_downtown():

@@ -217,6 +217,7 @@ def test_a_line_without_direction_is_survived():
         (FlyBanks((0.1,), 0.0, 15.0, 80.0), "hold = 0.0"),
         (FlyOrbit((0.0, 0.0), 0.0, 1, 15.0, 80.0), "radius = 0.0"),
         (FlyLine((0.0, math.nan), (1.0, 0.0), 15.0, 80.0), "aircraft 0 .* finite"),
+        (FlyBanks((0.1,), 1.0, 15.0, 80.0, (math.inf, 0.0)), "aircraft 0 .* finite"),
     ],
 )
 def test_commands_that_cannot_be_flown_are_refused(command, message):

@@ -1,6 +1,7 @@
 """Latency, jitter, copies, bandwidth, buildings, partitions: against counts, bounds and shapely."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy import stats
 
 from staniel.city import City
 from staniel.datatypes.belief import Pose, Sighting, TrackId
+from staniel.datatypes.command import FlyBanks
 from staniel.datatypes.equipment import Partition, RadioSet
 from staniel.datatypes.message import Award, Bid, Heartbeat, Message, Release, Report, Warn
 from staniel.datatypes.risk import RiskRegion
@@ -126,6 +128,10 @@ def test_sizes_on_the_air():
         0, 1, 0.0, pose=pose, role="search", goal=(0, 0), target=None, target_position=None, cost=0
     )
     assert wire_size(heartbeat) == 75
+    banks = FlyBanks((0.1, 0.2), 1.0, 15.0, 80.0)
+    assert wire_size(replace(heartbeat, command=banks)) == 75 + 13 + 1 + 2 * 2
+    led = replace(banks, look=(3.0, 4.0))
+    assert wire_size(replace(heartbeat, command=led)) == 75 + 13 + 1 + 2 * 2 + 8
     assert wire_size(Bid(0, 1, 0.0, target=name, auctioneer=1, cost=1.0)) == 36
     assert wire_size(Award(0, 1, 0.0, target=name, position=(0, 0), winner=1, cost=1.0)) == 44
     assert wire_size(Release(0, 1, 0.0, target=name, position=(0, 0), lost=True)) == 39

@@ -38,14 +38,15 @@ def encode(commands: Sequence[Command]) -> NDArray[np.float64]:
     rows = np.zeros((len(commands), COMMAND_WIDTH))
     for i, command in enumerate(commands):
         row = _row(command)
-        if not all(map(math.isfinite, row)):
+        look = command.look if isinstance(command, FlyBanks) and command.look else ()
+        if not all(map(math.isfinite, (*row, *look))):
             raise ValueError(f"command of aircraft {i} = {command}: expected finite numbers")
         rows[i, : len(row)] = row
     return rows
 
 
 def decode(row: NDArray[np.float64]) -> Command:
-    """The command of a row that `encode` could have made.
+    """The command of a row that `encode` could have made; a row has no look.
 
     Parameters
     ----------

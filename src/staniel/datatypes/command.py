@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-__all__ = ["Command", "FlyBanks", "FlyLine", "FlyOrbit", "look_point"]
+__all__ = ["Command", "FlyBanks", "FlyLine", "FlyOrbit", "look_point", "way_point"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,27 +32,47 @@ class FlyOrbit:
 
 @dataclass(frozen=True, slots=True)
 class FlyBanks:
-    """Hold each bank [rad, left positive] for `hold` seconds in turn, then the last one."""
+    """Hold each bank [rad, left positive] for `hold` seconds in turn, then the last one.
+
+    `look` is the ground point that a gimballed camera is to look at meanwhile [m], where it is to
+    look at one.
+    """
 
     banks: tuple[float, ...]
     hold: float
     speed: float
     altitude: float
+    look: tuple[float, float] | None = None
 
 
 Command = FlyLine | FlyOrbit | FlyBanks
 
 
-def look_point(command: Command) -> tuple[float, float]:
-    """Ground point that a gimballed camera looks at while the command is flown [m].
+def way_point(command: Command) -> tuple[float, float]:
+    """Ground point that a command leads to [m].
 
-    The end of a line, the center of an orbit; NaN for banks, which leads it nowhere.
+    The end of a line, the center of an orbit; NaN for banks, which lead nowhere.
 
     Examples
     --------
-    >>> look_point(FlyLine((0.0, 0.0), (50.0, 20.0), 15.0, 80.0))
+    >>> way_point(FlyLine((0.0, 0.0), (50.0, 20.0), 15.0, 80.0))
     (50.0, 20.0)
     """
     if isinstance(command, FlyLine):
         return command.end
     return command.center if isinstance(command, FlyOrbit) else (math.nan, math.nan)
+
+
+def look_point(command: Command) -> tuple[float, float]:
+    """Ground point that a gimballed camera looks at while the command is flown [m].
+
+    Where a line or an orbit leads to; what banks name, NaN where they name none.
+
+    Examples
+    --------
+    >>> look_point(FlyBanks((0.1,), 1.0, 15.0, 80.0, look=(50.0, 20.0)))
+    (50.0, 20.0)
+    """
+    if isinstance(command, FlyBanks) and command.look is not None:
+        return command.look
+    return way_point(command)

@@ -11,7 +11,7 @@ point, cost    8 (two 4-byte numbers), 4
 pose           24 (six 4-byte numbers)
 heartbeat      head, pose, role 1, goal, track name, point, cost; where it helps a track name; and
                for a command 29: kind 1, seven 4-byte numbers, or of banks 13: kind 1, hold, speed
-               and height, and 1 for their count and 2 for each
+               and height, and 1 for their count and 2 for each, and a point where they name a look
 report         head, and for each sighting 54: time 8, point, covariance 12, reporter 2, pose;
                and for each name that is told a track name
 warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling 4 each; and 8 for
@@ -93,5 +93,5 @@ def _region_size(region: RiskRegion) -> int:
 
 def _command_size(command: Command | None) -> int:
     if isinstance(command, FlyBanks):
-        return 14 + 2 * len(command.banks)
+        return 14 + 2 * len(command.banks) + (0 if command.look is None else _POINT)
     return 0 if command is None else _COMMAND

@@ -37,7 +37,7 @@ Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 class GuidanceConfig(Config):
     """Pursuit by a policy chosen by name, the loiters around it, and how paths are followed."""
 
-    pursuit: str = Field("carrot", description="name of the pursuit policy")
+    pursuit: str = Field("lookahead", description="name of the pursuit policy")
     prediction_steps: int = Field(
         3, ge=0, le=20, description="decision steps that pursuit looks ahead"
     )

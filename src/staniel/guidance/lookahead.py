@@ -4,6 +4,7 @@ Every decision step the belief is first corrected by the looks since the last si
 nothing, then thinned, led through the streets of the chart, and searched for the flight from which
 most of it is seen over the horizon. Its first second is flown, and the rest is what the next search
 has to beat. What a partner on the same target will see by its last plan heard counts for little.
+A gimballed camera is led to the middle of what is expected, and flights are scored by that.
 """
 
 import math
@@ -15,10 +16,10 @@ from numpy.typing import NDArray
 
 from staniel.city import City
 from staniel.datatypes.command import FlyBanks
-from staniel.datatypes.equipment import Airframe
+from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.risk import RiskRegion, region_arrays
 from staniel.guidance.config import LookaheadConfig
-from staniel.guidance.pursuit import NoFeasibleFlightError, Pursuit, pursuit_policy
+from staniel.guidance.pursuit import NoFeasibleFlightError, Partner, Pursuit, pursuit_policy
 from staniel.kernels.flight import MAX_BANKS
 from staniel.kernels.forecast import discredit, forecast
 from staniel.kernels.lookahead import Search, plan
@@ -38,6 +39,7 @@ _STEP = _HOLD / _SAMPLES
 _MISS = 0.1  # probability that a camera misses what it could see
 _MOST_LOOKS = 40  # in vain, that are remembered
 _OLDEST_PLAN = 6.0  # of a partner that is still counted on [s]
+_NO_POINT = (math.nan, math.nan)
 
 
 @dataclass(slots=True)
@@ -85,7 +87,8 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
         raise NoFeasibleFlightError(f"no flight of {config.horizon} s is free from {pursuit.pose}")
     memory.sequence, memory.planned = sequence, pursuit.time
     held = tuple(sequence[:MAX_BANKS].tolist())
-    return FlyBanks(held, _HOLD, airframe.speed, airframe.altitude)
+    east, north = places[1 : _SAMPLES + 1].mean(axis=(0, 1)).tolist()
+    return FlyBanks(held, _HOLD, airframe.speed, airframe.altitude, (east, north))
 
 
 def _memory(pursuit: Pursuit) -> _Memory:
@@ -155,11 +158,11 @@ def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
     camera, track = pursuit.camera, pursuit.track
     memory.looks = [look for look in memory.looks if look[0] > track.last_seen]
     if track.last_seen < pursuit.time:
-        memory.looks.append((pursuit.time, *pursuit.pose[:5]))
+        memory.looks.append((pursuit.time, *pursuit.pose[:5], *pursuit.look))
         memory.looks.extend(
-            (partner.time, *partner.pose[:5])
+            (partner.time, *partner.pose[:5], *point)
             for partner in pursuit.partners
-            if partner.time > track.last_seen
+            if partner.time > track.last_seen and (point := _look_of(partner, camera)) is not None
         )
         memory.looks = sorted(set(memory.looks))[-_MOST_LOOKS:]
     particles, weights = pursuit.cloud()
@@ -169,7 +172,7 @@ def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
         particles,
         weights,
         pursuit.time,
-        np.array(memory.looks).reshape(-1, 6),
+        np.array(memory.looks).reshape(-1, 8),
         camera.mounting,
         camera.target_height,
         camera.half_aperture,
@@ -180,6 +183,17 @@ def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
     sums = np.cumsum(weights)
     picks = np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
     return np.ascontiguousarray(particles[np.minimum(picks, len(particles) - 1)])
+
+
+def _look_of(partner: Partner, camera: Camera) -> tuple[float, float] | None:
+    """Where a partner looked when it spoke; None where it has a gimbal and did not say.
+
+    It tells where it looks from then on, which a second ago was nearly the same place.
+    """
+    plan = partner.plan
+    if camera.mount == "gimbal":
+        return None if plan is None else plan.look
+    return _NO_POINT
 
 
 def _share(pursuit: Pursuit, eye: Eye, places: Floats, weights: Floats) -> None:

@@ -6,6 +6,7 @@ commanded, be it a person's order or the team's own decision. See ``docs/avoidan
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from staniel.city import City
 from staniel.datatypes.autopilot import decode, encode, limits
 from staniel.datatypes.belief import Percept, Pose
 from staniel.datatypes.clock import Clock
-from staniel.datatypes.command import Command, look_point
+from staniel.datatypes.command import Command, FlyBanks, way_point
 from staniel.datatypes.equipment import Airframe, Lidar
 from staniel.datatypes.message import Heartbeat
 from staniel.datatypes.risk import RiskRegion, region_arrays
@@ -96,7 +97,7 @@ class Predictive:
         if tuple(regions) != self._regions:
             self._regions = tuple(regions)
             self._bans = bans(regions, self._config)
-        level, goal = pose.z + drift.climb, look_point(command)
+        level, goal = pose.z + drift.climb, way_point(command)
         wanted = encode([command])[0]
         rows, longer = wanted[None], np.zeros(1)
         choice, clear = self._choose(pose, rows, longer, goal, tops, others)
@@ -115,7 +116,7 @@ class Predictive:
         if guard and row[0] == LINE:
             self._heading = math.atan2(row[6] - row[4], row[5] - row[3])
         drift.expect(choice.there.tolist(), choice.climb)
-        return decode(row) if guard else command, guard
+        return _looking(decode(row), command) if guard else command, guard
 
     def _choose(
         self,
@@ -136,6 +137,13 @@ class Predictive:
         cost += _SHORT * speed * (FORESIGHT - clear) + _BANNED * banned
         order = np.argsort(cost, kind="stable")
         return choose(state, climb, rows, order, speed, *common), bool(clear[0] >= FORESIGHT)
+
+
+def _looking(flown: Command, wanted: Command) -> Command:
+    """What is flown, with the look that was wanted: other banks need not take a gimbal off it."""
+    if isinstance(flown, FlyBanks) and isinstance(wanted, FlyBanks):
+        return replace(flown, look=wanted.look)
+    return flown
 
 
 def bans(regions: Sequence[RiskRegion], config: GuidanceConfig) -> Bans:

@@ -87,6 +87,8 @@ class Pursuit:
         and whether it is forbidden to be there.
     partners : tuple of Partner
         Other aircraft on the same target, as of the last message heard of each.
+    look : (float, float) [m]
+        Ground point that the aircraft's gimbal, if it has one, was led to until now; NaN for none.
     memory : dict
         The agent's own, handed in again at its next step: what a policy wants to keep is there.
     """
@@ -102,6 +104,7 @@ class Pursuit:
     config: GuidanceConfig
     dangers: Dangers = NO_DANGERS
     partners: tuple[Partner, ...] = ()
+    look: tuple[float, float] = (math.nan, math.nan)
     memory: dict[str, Any] = field(default_factory=dict)
 
 

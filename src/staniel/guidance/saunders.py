@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from staniel.datatypes.belief import Percept, Pose
-from staniel.datatypes.command import Command, FlyOrbit, look_point
+from staniel.datatypes.command import Command, FlyOrbit, way_point
 from staniel.datatypes.equipment import Airframe
 from staniel.datatypes.message import Heartbeat, Point
 from staniel.datatypes.risk import RiskRegion
@@ -49,7 +49,7 @@ class Saunders:
         time, pose = percept.time, percept.pose
         for word in heartbeats:
             self._others[word.sender] = (word.time, word.pose)
-        goal = look_point(command)
+        goal = way_point(command)
         if not math.isfinite(goal[0]):
             goal = (pose.x + math.cos(pose.heading), pose.y + math.sin(pose.heading))
         if self._round is not None and not self._in_the_way(pose, goal, self._round[0]):

@@ -6,9 +6,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.pieces import woven
 from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
-__all__ = ["BODY", "Mount", "camera_axes", "camera_axis", "in_cone", "in_range", "look", "warm"]
+__all__ = [
+    "BODY",
+    "Mount",
+    "camera_axes",
+    "camera_axis",
+    "in_cone",
+    "in_range",
+    "look",
+    "swung",
+    "warm",
+]
 
 Array = NDArray[np.float64]
 Mount = tuple[float, float, float, float, float, float]
@@ -35,26 +46,35 @@ def camera_axis(heading: float, bank: float) -> tuple[float, float, float]:
     return math.sin(heading) * aside, -math.cos(heading) * aside, -math.cos(bank)
 
 
-@njit(cache=True, error_model="numpy")
-def _gimballed(pose: Array, x: float, y: float, limit: float) -> tuple[float, float, float]:
-    """Axis towards the ground point, or as near to it as `limit` from body-down lets.
+@woven
+def swung(
+    down: tuple[float, float, float],
+    east: float,
+    north: float,
+    below: float,
+    least: float,
+    most: float,
+) -> tuple[float, float, float]:
+    """Axis of a gimbal towards a point, or as near to it as its limit lets.
 
-    Straight down is the wish where the point is NaN, or where the camera itself is.
+    The point is `east`, `north` and `below` of the camera [m]. Straight down is the wish where it
+    is NaN, or where the camera itself is. `down` is the aircraft's own down axis, `least` and
+    `most` are cosine and sine of how far the gimbal swings from it.
     """
-    dx, dy, dz = x - pose[0], y - pose[1], -pose[2]
+    down_x, down_y, down_z = down
+    dx, dy, dz = east, north, -below
     distance = math.sqrt(dx * dx + dy * dy + dz * dz)
     if not distance > 0.0:
         dx, dy, dz, distance = 0.0, 0.0, -1.0, 1.0
     dx, dy, dz = dx / distance, dy / distance, dz / distance
-    down_x, down_y, down_z = camera_axis(pose[3], pose[4])
     cosine = dx * down_x + dy * down_y + dz * down_z
+    if cosine >= least:
+        return dx, dy, dz
     # What of the wish is across body-down: its length is the sine of the angle between them.
     side_x, side_y, side_z = dx - cosine * down_x, dy - cosine * down_y, dz - cosine * down_z
     sine = math.sqrt(side_x * side_x + side_y * side_y + side_z * side_z)
-    if math.atan2(sine, cosine) <= limit or sine == 0.0:
-        return dx, dy, dz
-    a, b = math.cos(limit), math.sin(limit) / sine
-    return a * down_x + b * side_x, a * down_y + b * side_y, a * down_z + b * side_z
+    b = most / sine if sine > 0.0 else 0.0
+    return least * down_x + b * side_x, least * down_y + b * side_y, least * down_z + b * side_z
 
 
 @njit(cache=True, error_model="numpy")
@@ -85,7 +105,9 @@ def camera_axes(aircraft: Array, looks: Array, mount: Mount) -> Array:
             axes[i, 0] = axes[i, 1] = axes[i, 2] = math.nan
             continue
         if limit >= 0.0:
-            x, y, z = _gimballed(aircraft[i], looks[i, 0], looks[i, 1], limit)
+            east, north = looks[i, 0] - aircraft[i, 0], looks[i, 1] - aircraft[i, 1]
+            down = camera_axis(aircraft[i, 3], aircraft[i, 4])
+            x, y, z = swung(down, east, north, aircraft[i, 2], math.cos(limit), math.sin(limit))
             axes[i, 0], axes[i, 1], axes[i, 2] = x, y, z
             continue
         bank = rolls * aircraft[i, 4]

@@ -1,7 +1,7 @@
 """Where a target may be: what looks in vain say of the past, and the chart's streets of the future.
 
 A row of a cloud is x, y [m], vx, vy [m/s]; a row of looks is time [s], x, y, z [m], heading, bank
-[rad], of a camera that saw nothing of the target then.
+[rad], of a camera that saw nothing of the target then, and x, y [m] of where a gimbal looked.
 """
 
 import math
@@ -129,7 +129,7 @@ def discredit(
     cloud : (n, 4) float array
     weights : (n,) float array
     now : float [s]
-    looks : (k, 6) float array
+    looks : (k, 8) float array
     mount : Mount
     height : float [m]
         Where on a vehicle it is seen.
@@ -143,11 +143,11 @@ def discredit(
     for i in range(n):
         if inside(walls, cloud[i, 0], cloud[i, 1]) >= 0:
             left[i] *= miss
-    pose, ground = np.zeros((1, 6)), np.full((1, 2), math.nan)
+    pose = np.zeros((1, 6))
     for k in range(looks.shape[0]):
         ago, x, y, z = now - looks[k, 0], looks[k, 1], looks[k, 2], looks[k, 3]
-        pose[0, 2], pose[0, 3], pose[0, 4] = z, looks[k, 4], looks[k, 5]
-        axis = camera_axes(pose, ground, mount)[0]
+        pose[0, :5] = looks[k, 1:6]
+        axis = camera_axes(pose, looks[k : k + 1, 6:], mount)[0]
         for i in range(n):
             px, py = cloud[i, 0] - ago * cloud[i, 2], cloud[i, 1] - ago * cloud[i, 3]
             if in_cone(
@@ -163,4 +163,4 @@ def warm() -> None:
     """Compile, or load from the disk cache, what a flight calls."""
     walls, cloud = warm_walls(), np.zeros((1, 4))
     forecast(walls, cloud, 1, 0.5)
-    discredit(walls, cloud, np.ones(1), 0.0, np.zeros((1, 6)), BODY, 1.0, 1.0, 1.0, 0.1)
+    discredit(walls, cloud, np.ones(1), 0.0, np.zeros((1, 8)), BODY, 1.0, 1.0, 1.0, 0.1)

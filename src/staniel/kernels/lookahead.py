@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from staniel.kernels.footprint import BODY
+from staniel.kernels.footprint import BODY, swung
 from staniel.kernels.lookout import (
     Eye,
     axis_of,
@@ -82,7 +82,7 @@ class Scene(NamedTuple):
     weights: Floats
     """(t + 1, m), those of 0 last."""
     centers: Floats
-    """(t + 1, 2) middle of the places [m]."""
+    """(t + 1, 2) middle of the places, where a gimbal looks [m]."""
     worths: Floats
     """(t + 1,) what a second at each instant counts."""
     start: Floats
@@ -135,6 +135,8 @@ def _flown(scene: Scene, sequence: Floats, rows: Floats, level: int) -> float:
     search, walls, memory, eye = scene.search, scene.walls, scene.memory, scene.eye
     samples, step, altitude, speed = search.samples, search.step, memory.altitude, scene.start[5]
     gain, rate, worths = search.roll_gain, search.roll_rate, scene.worths
+    centers, limit = scene.centers, eye.mount[5]
+    swings, least, most = limit >= 0.0, math.cos(limit), math.sin(limit)
     low, dangerous = flies_low(walls, altitude), scene.rates.size > 0
     for k in range(level, sequence.size):
         x, y, heading, bank = rows[k, 0], rows[k, 1], rows[k, 2], rows[k, 3]
@@ -145,6 +147,9 @@ def _flown(scene: Scene, sequence: Floats, rows: Floats, level: int) -> float:
             if low and strikes(walls, from_x, from_y, x, y, altitude):
                 return -math.inf
             axis = axis_of(heading, bank, eye.mount)
+            if swings:
+                east, north = centers[t, 0] - x, centers[t, 1] - y
+                axis = swung(axis, east, north, altitude, least, most)
             seen = watch(
                 memory, walls, eye, scene.slots[t], scene.places[t], scene.weights[t], x, y, axis
             )
@@ -203,7 +208,9 @@ def _grown(
     search, walls, memory, eye = scene.search, scene.walls, scene.memory, scene.eye
     samples, step, altitude = search.samples, search.step, memory.altitude
     low, dangerous = flies_low(walls, altitude), scene.rates.size > 0
-    moves, worths = search.moves, scene.worths
+    moves, worths, centers = search.moves, scene.worths, scene.centers
+    limit = eye.mount[5]
+    swings, least, most = limit >= 0.0, math.cos(limit), math.sin(limit)
     end = np.empty(moves.ends.shape[3])
     table[:] = -1
     count = 0
@@ -230,6 +237,9 @@ def _grown(
                 axis = (
                     east * moves.forward - north * aside, north * moves.forward + east * aside, up
                 )  # fmt: skip
+                if swings:
+                    east, north = centers[t, 0] - x, centers[t, 1] - y
+                    axis = swung(axis, east, north, altitude, least, most)
                 seen = watch(
                     memory, walls, eye, scene.slots[t], scene.places[t], scene.weights[t],
                     x, y, axis,
@@ -341,7 +351,8 @@ def plan(
     start : (6,) float array
         The aircraft's pose: x, y, z, heading, bank, speed.
     places : (t + 1, m, 2) float array [m]
-        Where the target may be, now and after each step of the search.
+        Where the target may be, now and after each step of the search. A gimbal is led to their
+        mean.
     weights : (t + 1, m) float array
         What seeing it there is worth.
     previous : (holds,) float array [rad]

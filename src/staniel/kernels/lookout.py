@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.flight import lagged
-from staniel.kernels.footprint import BODY, Mount, in_cone
+from staniel.kernels.footprint import BODY, Mount, in_cone, swung
 from staniel.kernels.pieces import woven
 from staniel.kernels.risk import Regions
 from staniel.kernels.sightlines import Sightlines, new_sightlines, sees, slot_of
@@ -20,6 +20,7 @@ from staniel.kernels.walls import Walls, line_of_sight, warm_walls
 
 __all__ = [
     "Eye",
+    "aim",
     "axis_of",
     "danger",
     "flies_low",
@@ -129,14 +130,26 @@ def roll_out(
 
 @njit(cache=True, error_model="numpy")
 def axis_of(heading: float, bank: float, mount: Mount) -> tuple[float, float, float]:
-    """Along which a mounted camera looks, as `camera_axes`; a gimbal looks straight down."""
-    forward, left, up, rolls, _, limit = mount
-    if limit >= 0.0:
-        forward, left, up, rolls = 0.0, 0.0, -1.0, 0.0
+    """Along which a mounted camera looks, as `camera_axes`; of a gimbal its aircraft's down."""
+    forward, left, up, rolls, _, _ = mount
     cosine, sine = math.cos(rolls * bank), math.sin(rolls * bank)
     aside = cosine * left + sine * up
     east, north = math.cos(heading), math.sin(heading)
     return east * forward - north * aside, north * forward + east * aside, cosine * up - sine * left
+
+
+@njit(cache=True, error_model="numpy")
+def aim(
+    east: float, north: float, below: float, heading: float, bank: float, mount: Mount
+) -> tuple[float, float, float]:
+    """Along which any camera looks whose gimbal, if it has one, is led to a point.
+
+    The point is `east`, `north` and `below` of the camera [m].
+    """
+    axis, limit = axis_of(heading, bank, mount), mount[5]
+    if limit >= 0.0:
+        axis = swung(axis, east, north, below, math.cos(limit), math.sin(limit))
+    return axis
 
 
 @woven
@@ -198,6 +211,8 @@ def shade(
 ) -> None:
     """Take from the weights what a partner sees who flies the poses, in place.
 
+    A gimbal looks at the middle of the places.
+
     Parameters
     ----------
     walls : Walls
@@ -214,7 +229,8 @@ def shade(
     cosine = math.cos(eye.half_aperture)
     for t in range(weights.shape[0]):
         x, y, z = poses[t, 0], poses[t, 1], poses[t, 2]
-        ax, ay, az = axis_of(poses[t, 3], poses[t, 4], eye.mount)
+        east, north = places[t, :, 0].mean() - x, places[t, :, 1].mean() - y
+        ax, ay, az = aim(east, north, z, poses[t, 3], poses[t, 4], eye.mount)
         for j in range(weights.shape[1]):
             px, py = places[t, j, 0], places[t, j, 1]
             if in_cone(px - x, py - y, height - z, ax, ay, az, cosine, eye.reach) and line_of_sight(

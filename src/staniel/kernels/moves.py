@@ -29,9 +29,9 @@ class Moves(NamedTuple):
     """(k,) what may be held, evenly from limit to limit [rad]."""
     ends: Floats
     """(_BINS, k, samples, 8) after each sample, in the frame of the start: the way ahead and to the
-    left, heading, cosine and sine of it, bank, and the camera's axis to the left and up."""
+    left, heading, cosine and sine of it, bank, and the axis to the left and up, of `axis_of`."""
     forward: float
-    """The camera's axis ahead, which no bank changes."""
+    """That axis ahead, which no bank changes."""
 
 
 @njit(cache=True, error_model="numpy")

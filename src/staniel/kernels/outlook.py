@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.footprint import BODY, in_cone
-from staniel.kernels.lookout import Eye, axis_of, glide
+from staniel.kernels.lookout import Eye, aim, glide
 from staniel.kernels.walls import Walls, inside, line_of_sight, warm_walls
 
 __all__ = [
@@ -116,8 +116,8 @@ def outlook(table: Outlook, ahead: float, left: float, bank: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def _sight(eye: Eye, free: Floats, u: float, v: float, height: float, bank: float) -> float:
-    """Chance to see a target u ahead, v to the left and `height` below."""
-    ax, ay, az = axis_of(0.0, bank, eye.mount)
+    """Chance to see a target u ahead, v to the left and `height` below, where a gimbal looks."""
+    ax, ay, az = aim(u, v, height, 0.0, bank, eye.mount)
     cosine = math.cos(eye.half_aperture)
     if not in_cone(u, v, -height, ax, ay, az, cosine, eye.reach):
         return 0.0

@@ -341,6 +341,8 @@ def _command(time: float, item: Mapping[str, Any]) -> Row:
         a, b = item["start"], item["end"]
     elif kind == "orbit":
         a, radius, turn = item["center"], item["radius"], item["turn"]
+    elif kind == "banks":
+        a = item.get("look", _NOWHERE)
     (ax, ay), (bx, by) = a, b
     return time, item["agent"], kind, ax, ay, bx, by, radius, turn, item["speed"], item["altitude"]
 

@@ -67,7 +67,8 @@ _ORBIT = (
     '{"agent":%d,"kind":"orbit","center":[%.3f,%.3f],"radius":%.3f,"turn":%d,"speed":%.3f,'
     '"altitude":%.3f}'
 )
-_BANKS = '{"agent":%d,"kind":"banks","banks":[%s],"hold":%s,"speed":%.3f,"altitude":%.3f}'
+_BANKS = '{"agent":%d,"kind":"banks","banks":[%s],"hold":%s,"speed":%.3f,"altitude":%.3f%s}'
+_LOOK = ',"look":[%.3f,%.3f]'
 _NOMINAL = np.array(NOMINAL)
 _DECISION = '{"agent":%d,"role":"%s","target":%s,"goal":[%.3f,%.3f]}'
 
@@ -262,7 +263,8 @@ def _command(agent: int, command: Command) -> str:
     if isinstance(command, FlyOrbit):
         return _ORBIT % (agent, *command.center, command.radius, command.turn, *flown)
     banks = ",".join(f"{bank:.4f}" for bank in command.banks)
-    return _BANKS % (agent, banks, _time(command.hold), *flown)
+    look = "" if command.look is None else _LOOK % command.look
+    return _BANKS % (agent, banks, _time(command.hold), *flown, look)
 
 
 def _decision(agent: int, belief: Belief) -> str:

@@ -143,7 +143,7 @@ _COMMAND = {
         speed=_number("airspeed [m/s]"),
         altitude=_number("above ground [m]"),
     ),
-    "description": "line: start, end; orbit: center, radius, turn; banks: banks, hold",
+    "description": "line: start, end; orbit: center, radius, turn; banks: banks, hold (look)",
 }
 _COMMAND["properties"] |= {
     "start": _POINT,
@@ -153,6 +153,7 @@ _COMMAND["properties"] |= {
     "turn": _integer("+1 counter-clockwise seen from above, -1 clockwise"),
     "banks": _list(_number("left positive [rad]")),
     "hold": _number("of each bank [s]"),
+    "look": {**_POINT, "description": "of a gimbal, where banks name one: east, north [m]"},
 }
 _DECISION = _object(
     agent=_integer("aircraft"),

@@ -57,7 +57,7 @@ class Reporter(LiveBar):
 
     def __init__(self, *, quiet: bool = False, console: Console | None = None) -> None:
         super().__init__(quiet=quiet, console=console)
-        note = "compiling the kernels: only the first time, about 30 s"
+        note = "compiling the kernels: only the first time, about a minute"
         self._note = threading.Timer(PATIENCE, self._say, [note])
         self._note.daemon = True
         self._noting = False
