@@ -158,7 +158,6 @@ def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
     camera, track = pursuit.camera, pursuit.track
     memory.looks = [look for look in memory.looks if look[0] > track.last_seen]
     if track.last_seen < pursuit.time:
-        memory.looks.append((pursuit.time, *pursuit.pose[:5], *pursuit.look))
         memory.looks.extend(
             (partner.time, *partner.pose[:5], *point)
             for partner in pursuit.partners
