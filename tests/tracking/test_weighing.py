@@ -259,3 +259,21 @@ def test_a_particle_far_away_stays_where_the_sighting_is_rather_a_false_alarm():
     moved = np.abs(cloud.state[0][:2] - drawn[:2]).max(axis=0) > 1e-4
     assert moved[density > 2.0 * floor].mean() > 0.99
     assert not moved[density < 0.5 * floor].any()
+
+
+@pytest.mark.parametrize(("width", "rel"), [(0.0, 0.05), (0.5, 0.15)])
+@pytest.mark.parametrize("z", [(0.0, 0.0), (4.0, 0.0), (7.0, 0.0)])
+@pytest.mark.parametrize(("share", "floor"), [(1.0, 1e-5), (0.02, 1e-3), (0.3, 1e-2)])
+def test_a_sighting_that_may_be_false_is_believed_by_its_odds(width, rel, z, share, floor):
+    """The mean and covariance of the mixture of both; little Gaussians shrink a bit too much."""
+    m, P = np.zeros(4), np.diag([9.0, 9.0, 1.0, 1.0])
+    likely = share * multivariate_normal(np.zeros(2), P[:2, :2] + R).pdf(z)
+    belief = likely / (likely + floor)
+    seen, after = kalman(m, P, [(np.array(z), np.eye(2, 4))])
+    mean = belief * seen
+    cov = belief * (after + np.outer(seen, seen)) + (1.0 - belief) * P - np.outer(mean, mean)
+    cloud = Cloud(gaussian(N, m, P))
+    cloud.meet([z], shares=[share], floor=floor, width=width)
+    ours, own = cloud.moments()
+    np.testing.assert_allclose(ours, mean, atol=0.15 if width else 0.08)
+    np.testing.assert_allclose(np.diag(own), np.diag(cov), rtol=rel)
