@@ -49,6 +49,7 @@ OURS = TrackingConfig(
     particles=PARTICLES,
     dynamics="constant-velocity",
     acceleration_noise=KNOWN.acceleration**0.5,
+    kernel=0.5,
     max_speed=FASTEST,
     detection_probability=KNOWN.detection,
     view_probability=1.0,

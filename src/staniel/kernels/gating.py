@@ -12,6 +12,7 @@ __all__ = ["gated", "warm"]
 Array = NDArray[Any]
 
 _CELLS = 4  # of the grid, for each sighting: no more, however far apart they lie
+_FAR_BEYOND = 25.0  # times the harmonic mean of the variances
 _LOG_2PI = 1.8378770664093453
 
 
@@ -39,6 +40,26 @@ def _binned(sightings: Array, cell: float) -> tuple[Array, Array, Array]:
         members[filled[where[j]]] = j
         filled[where[j]] += 1
     return np.array([low_x, low_y, cell, float(columns), float(rows)]), starts, members
+
+
+@njit(cache=True, error_model="numpy")
+def _usual(sightings: Array) -> tuple[float, Array]:
+    """The greatest variance that is not far beyond the usual [m²], and who has a greater one."""
+    m = sightings.shape[0]
+    inverse = 0.0
+    for j in range(m):
+        inverse += 1.0 / max(sightings[j, 3], sightings[j, 5])
+    most = _FAR_BEYOND * m / inverse
+    widest, count = 0.0, 0
+    wide = np.empty(m, np.int64)
+    for j in range(m):
+        variance = max(sightings[j, 3], sightings[j, 5])
+        if variance > most:
+            wide[count] = j
+            count += 1
+        else:
+            widest = max(widest, variance)
+    return widest, wide[:count]
 
 
 @njit(cache=True, error_model="numpy")
@@ -85,12 +106,15 @@ def gated(
     found = 0
     if m == 0 or count == 0:
         return pairs[:0], scores[:0], nearest
-    widest, oldest = 0.0, 0.0
+    oldest = 0.0
     for j in range(m):
-        widest = max(widest, sightings[j, 3], sightings[j, 5])
         oldest = max(oldest, now - sightings[j, 0])
+    # The few that are far less exact than the rest would make every reach as wide as theirs: they
+    # are held against every track instead.
+    widest, wide = _usual(sightings)
     frame, starts, members = _binned(sightings, 2.0 * gate * math.sqrt(2.0 * widest))
     cell, columns, rows = frame[2], int(frame[3]), int(frame[4])
+    near_by = np.empty(m, np.int64)
     for k in range(count):
         mean, cov = means[k], covariances[k]
         x, y = origins[k, 0] + mean[0], origins[k, 1] + mean[1]
@@ -100,27 +124,32 @@ def gated(
         east = min((x + reach_x - frame[0]) / cell, columns - 0.5)
         south = max((y - reach_y - frame[1]) / cell, 0.0)
         north = min((y + reach_y - frame[1]) / cell, rows - 0.5)
-        if not (west <= columns and east >= 0.0 and south <= rows and north >= 0.0):
-            continue
-        for row in range(int(south), int(north) + 1):
-            first = row * columns
-            for p in range(starts[first + int(west)], starts[first + int(east) + 1]):
-                j = members[p]
-                z = sightings[j]
-                late = now - z[0]
-                dx, dy = z[1] - x + late * mean[2], z[2] - y + late * mean[3]
-                nearest[j] = min(nearest[j], math.hypot(dx, dy))
-                xx, xy, yy = cov[0, 0] + z[3], cov[0, 1] + z[4], cov[1, 1] + z[5]
-                det = xx * yy - xy * xy
-                square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det
-                if square > gate * gate:
-                    continue
-                if found == scores.size:
-                    pairs = np.concatenate((pairs, np.empty_like(pairs)))
-                    scores = np.concatenate((scores, np.empty_like(scores)))
-                pairs[found, 0], pairs[found, 1] = k, j
-                scores[found] = -_LOG_2PI - 0.5 * (math.log(det) + square)
-                found += 1
+        asked = wide.size
+        near_by[:asked] = wide
+        if west <= columns and east >= 0.0 and south <= rows and north >= 0.0:
+            for row in range(int(south), int(north) + 1):
+                first = row * columns
+                for p in range(starts[first + int(west)], starts[first + int(east) + 1]):
+                    j = members[p]
+                    if max(sightings[j, 3], sightings[j, 5]) <= widest:
+                        near_by[asked] = j
+                        asked += 1
+        for j in near_by[:asked]:
+            z = sightings[j]
+            late = now - z[0]
+            dx, dy = z[1] - x + late * mean[2], z[2] - y + late * mean[3]
+            nearest[j] = min(nearest[j], math.hypot(dx, dy))
+            xx, xy, yy = cov[0, 0] + z[3], cov[0, 1] + z[4], cov[1, 1] + z[5]
+            det = xx * yy - xy * xy
+            square = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / det
+            if square > gate * gate:
+                continue
+            if found == scores.size:
+                pairs = np.concatenate((pairs, np.empty_like(pairs)))
+                scores = np.concatenate((scores, np.empty_like(scores)))
+            pairs[found, 0], pairs[found, 1] = k, j
+            scores[found] = -_LOG_2PI - 0.5 * (math.log(det) + square)
+            found += 1
     return pairs[:found], scores[:found], nearest
 
 

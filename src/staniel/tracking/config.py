@@ -15,7 +15,7 @@ class TrackingConfig(Config):
     particles: int = Field(1000, ge=50, le=100_000, description="particles of each track")
 
     dynamics: Literal["random-controls", "learned", "constant-velocity"] = Field(
-        "learned", description="how particles move; learned: from the track's own history"
+        "random-controls", description="how particles move; learned: from the track's own history"
     )
     max_speed: float = Field(25.0, gt=0.0, le=200.0, description="no target is faster [m/s]")
     turn_noise: float = Field(0.15, ge=0.0, le=10.0, description="course's random walk [rad/√s]")
@@ -41,7 +41,7 @@ class TrackingConfig(Config):
         0.35, ge=0.0, le=1.0, description="share of effective particles that causes resampling"
     )
     kernel: float = Field(
-        0.5, ge=0.0, lt=1.0, description="width of a particle, over the cloud's; 0: bootstrap"
+        0.3, ge=0.0, lt=1.0, description="width of a particle, over the cloud's; 0: bootstrap"
     )
     roughening: float = Field(
         0.15, ge=0.0, le=1.0, description="jitter of copies that saw nothing, over the cloud's"
@@ -89,7 +89,7 @@ class TrackingConfig(Config):
         90.0, ge=0.0, le=3600.0, description="a lost target's name is kept for its return [s]"
     )
     newcomers: float = Field(
-        1e-5, gt=0.0, le=1.0, description="density of targets that were never seen [1/m²]"
+        2e-6, gt=0.0, le=1.0, description="density of targets that were never seen [1/m²]"
     )
     merge_distance: float = Field(
         3.0, ge=0.0, le=1000.0, description="two tracks as near as this may be one target [m]"

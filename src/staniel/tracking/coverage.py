@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Sequence
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from staniel.datatypes.belief import Pose
@@ -16,6 +18,8 @@ __all__ = ["Coverage", "checked_coverage"]
 
 Places = NDArray[np.float64]
 Shows = Callable[[Places], NDArray[np.bool_]]
+
+_CLOCK_TOLERANCE = 1e-3
 
 
 class Coverage(NamedTuple):
@@ -47,45 +51,63 @@ class Coverage(NamedTuple):
         return self.visible(places)
 
 
-def checked_coverage(coverage: Sequence[Any] | None, now: float) -> list[Coverage] | None:
+def checked_coverage(coverage: Any, now: float) -> list[Coverage] | None:  # noqa: ANN401 - unchecked
     """The looks, checked, polygons prepared.
 
     Raises
     ------
     StanielError
-        One that is not (pose, visible, detection probability[, time]), or later than `now`.
+        Not a sequence of looks, one that is not (pose, visible, detection probability[, time]), or
+        is later than `now`, or whose callable does not answer as it should for one place.
     """
     if coverage is None:
         return None
-    looks = []
-    for number, given in enumerate(coverage):
-        try:
-            look = given if isinstance(given, Coverage) else Coverage(*given)
-        except TypeError as error:
+    if isinstance(coverage, BaseGeometry | Coverage) or not isinstance(coverage, Sequence):
+        raise StanielError(
+            f"coverage is a {type(coverage).__name__}: expected a sequence of looks, each (pose, "
+            "visible polygon, detection probability)"
+        )
+    return [_checked(f"coverage[{number}]", given, now) for number, given in enumerate(coverage)]
+
+
+def _checked(name: str, given: Any, now: float) -> Coverage:  # noqa: ANN401 - unchecked
+    try:
+        look = given if isinstance(given, Coverage) else Coverage(*given)
+    except TypeError as error:
+        raise StanielError(
+            f"{name}: expected (pose, visible polygon, detection probability), "
+            f"got {type(given).__name__}"
+        ) from error
+    probability, time, visible = look.detection_probability, look.time, look.visible
+    if not (isinstance(probability, Real) and 0.0 <= probability < 1.0):
+        raise StanielError(f"{name}.detection_probability = {probability}: expected 0 to below 1")
+    if time is not None and not (
+        isinstance(time, Real) and math.isfinite(time) and time <= now + _CLOCK_TOLERANCE
+    ):
+        raise StanielError(f"{name}.time = {time}: expected {now:g}, the step's, or earlier")
+    if isinstance(visible, Polygon | MultiPolygon):
+        if not visible.is_valid:
             raise StanielError(
-                f"coverage[{number}]: expected (pose, visible polygon, detection probability), "
-                f"got {type(given).__name__}"
-            ) from error
-        probability = look.detection_probability
-        if not (isinstance(probability, float | int) and 0.0 <= probability < 1.0):
-            raise StanielError(
-                f"coverage[{number}].detection_probability = {probability}: expected 0 to below 1"
+                f"{name}.visible: expected a valid polygon, found "
+                f"{shapely.is_valid_reason(visible)}"
             )
-        if look.time is not None and not (math.isfinite(look.time) and look.time <= now + 1e-3):
-            raise StanielError(
-                f"coverage[{number}].time = {look.time}: expected {now:g}, the step's, or earlier"
-            )
-        if isinstance(look.visible, BaseGeometry):
-            if not look.visible.is_valid:
-                raise StanielError(
-                    f"coverage[{number}].visible: expected a valid polygon, found "
-                    f"{shapely.is_valid_reason(look.visible)}"
-                )
-            shapely.prepare(look.visible)
-        elif not callable(look.visible):
-            raise StanielError(
-                f"coverage[{number}].visible is a {type(look.visible).__name__}: "
-                "expected a shapely polygon or a callable"
-            )
-        looks.append(look)
-    return looks
+        shapely.prepare(visible)
+    elif callable(visible):
+        _probe(name, visible)
+    else:
+        raise StanielError(
+            f"{name}.visible is a {type(visible).__name__}: expected a polygon or a callable"
+        )
+    return look
+
+
+def _probe(name: str, visible: Shows) -> None:
+    """Ask a callable of one place, before anything has changed."""
+    try:
+        answer = visible(np.zeros((1, 2)))
+    except Exception as error:
+        raise StanielError(f"{name}.visible: fails for the place (0, 0): {error}") from error
+    if not (isinstance(answer, np.ndarray) and answer.dtype == bool and answer.shape == (1,)):
+        raise StanielError(
+            f"{name}.visible: expected a (1,) bool array for one place, got {answer!r}"
+        )

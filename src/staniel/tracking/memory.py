@@ -17,7 +17,8 @@ Floats = NDArray[np.float64]
 
 _MOST = 50  # lost targets; the longest lost is forgotten first
 _STRIDE = 2.0  # of the prediction in retrospect [s]
-_BLUR = 9.0  # variance of the Gaussian that a particle stands for [m²]
+_BLUR = 9.0  # variance of the Gaussian that a particle stands for, at least [m²]
+_BANDWIDTH = 0.25  # more of it: so much of the cloud's, for n particles over their cube root
 
 
 class Memory:
@@ -80,9 +81,11 @@ class Memory:
 
     def _gain(self, k: int, place: Floats) -> float:
         """Log of how much likelier the place is for the lost target than for a newcomer."""
-        x, y = place[0, 0] - self._bank.origins[k, 0], place[1, 0] - self._bank.origins[k, 1]
-        xx, yy = place[0, 2] + _BLUR, place[1, 2] + _BLUR
         state, weights = self._bank.state[k], self._bank.weights[k]
+        own = _BANDWIDTH * weights.size ** (-1.0 / 3.0)
+        x, y = place[0, 0] - self._bank.origins[k, 0], place[1, 0] - self._bank.origins[k, 1]
+        xx = place[0, 2] + _BLUR + own * float(state[0].var())
+        yy = place[1, 2] + _BLUR + own * float(state[1].var())
         square = (state[0] - x) ** 2 / xx + (state[1] - y) ** 2 / yy
         density = float(weights @ np.exp(-0.5 * square)) / (2.0 * math.pi * math.sqrt(xx * yy))
         return math.log(density + 1e-30) - math.log(self._config.newcomers)
