@@ -89,7 +89,7 @@ def test_no_particle_is_faster_than_the_bounds(fastest, dt, kick, bound, seed):
     clouds.predict(dt, motion=(bound, 0.1, 0.2, 0.1))
     speed = np.hypot(*clouds.state[0, 2:])
     assert np.isfinite(clouds.state).all()
-    assert speed.max() <= min(bound, 1.5 * fastest + 2.0) * (1.0 + 1e-5)
+    assert speed.max() <= min(bound, max(1.5 * fastest + 2.0, 8.0)) * (1.0 + 1e-5)
 
 
 def test_a_straight_mover_stays_straight_on_average():
@@ -118,10 +118,21 @@ def test_fresh_courses_are_uniform_and_as_frequent_as_asked():
     clouds.predict(motion=(4.0, 0.0, 0.2, 0.1))
     course, speed = np.arctan2(*clouds.state[0, :1:-1]), np.hypot(*clouds.state[0, 2:])
     turned, restarted = np.abs(course) > 1e-4, np.abs(speed - 2.0) > 1e-3
-    assert turned.mean() == pytest.approx(1.0 - np.exp(-0.3), abs=1e-3)
+    assert turned.mean() == pytest.approx(1.0 - np.exp(-0.2), abs=1e-3)
+    assert not (turned & restarted).any()
     assert restarted.mean() == pytest.approx(np.exp(-0.2) - np.exp(-0.3), abs=1e-3)
     assert kstest(course[turned], "uniform", args=(-np.pi, 2.0 * np.pi)).pvalue > 0.01
     assert kstest(speed[restarted], "uniform", args=(0.0, 4.0)).pvalue > 0.01
+
+
+def test_who_drives_off_may_do_so_on_any_course():
+    clouds = eastbound(20_000, 0.01, habits=(0.0, 0.0, 0.0, 0.0))
+    clouds.predict(motion=(25.0, 0.0, 0.0, 0.5))
+    course, speed = np.arctan2(*clouds.state[0, :1:-1]), np.hypot(*clouds.state[0, 2:])
+    gone = speed > 0.02
+    assert gone.mean() == pytest.approx((1.0 - np.exp(-0.5)) * (1.0 - 0.02 / 8.0), abs=2e-3)
+    assert kstest(course[gone], "uniform", args=(-np.pi, 2.0 * np.pi)).pvalue > 0.01
+    assert kstest(speed[gone], "uniform", args=(0.02, 8.0)).pvalue > 0.01
 
 
 def test_no_particle_turns_more_often_than_another():

@@ -31,8 +31,9 @@ _GOLDEN_32 = np.uint32(0x9E3779B9)
 _TWO_32 = np.float32(1.0 / 4294967296.0)
 _BURIED = np.float32(math.log(0.3))  # weight left to a particle that stays inside a building
 _HASTE = 1.5  # no particle is faster than so many times the fastest that its track was, and
-_START = 2.0  # and this [m/s]
+_START = 8.0  # and anybody may drive off at this [m/s]
 _PATIENCE = 60.0  # in which a track's fastest is forgotten [s]
+_ONWARD = np.float32(1.0)  # a faster one that changes its speed keeps its course [m/s]
 _CRAWL = 0.5  # a slower one has no course to speak of [m/s]
 
 
@@ -46,7 +47,7 @@ def _steer(
     vx, vy = state[2, first:last], state[3, first:last]
     n_turn, n_speed, n_x, n_y = noise[0], noise[1], noise[2], noise[3]
     root = np.sqrt(dt)
-    fastest = np.float32(min(motion[0], _HASTE * habits[0] + _START))
+    fastest = np.float32(min(motion[0], max(_HASTE * habits[0] + 2.0, _START)))
     half_turn = np.float32(0.5 * habits[2] * root) * sign
     half_bend = np.float32(0.5 * habits[1] * dt)
     kick = np.float32(habits[3] * root) * sign
@@ -65,7 +66,7 @@ def _steer(
         restarted = (u - p_turn) * per_restart
         new = restarted if (u >= p_turn) & (u < p_any) else walked
         # Rotation by 2 atan(b/a): a small Gaussian angle, or, of two normals, a uniform one.
-        fresh = u < p_any
+        fresh = (u < p_turn) | ((u < p_any) & (speed < _ONWARD))
         a = n_x[i] if fresh else _F1
         b = n_y[i] if fresh else half_bend + half_turn * n_turn[i]
         scale = new / ((speed + _TINY) * (a * a + b * b + _TINY))
@@ -196,8 +197,8 @@ def predict(
     """Move all particles by one step, in place (thesis section 6.3).
 
     Under controls, speed does a random walk, reflected at 0 and held at its bound; course does a
-    random walk; now and then a particle turns to a fresh course, or restarts with a fresh course
-    and speed. The second half of the particles draws the opposite of what the first half draws.
+    random walk; now and then a particle turns to a fresh course, or changes to any speed, and from
+    a stand to any course too. The second half of the particles draws the opposite of the first.
 
     Parameters
     ----------

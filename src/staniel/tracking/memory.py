@@ -11,7 +11,7 @@ from staniel.datatypes.belief import TrackId
 from staniel.tracking.bank import Bank
 from staniel.tracking.config import TrackingConfig
 
-__all__ = ["Memory"]
+__all__ = ["Memory", "gain_of"]
 
 Floats = NDArray[np.float64]
 
@@ -19,6 +19,30 @@ _MOST = 50  # lost targets; the longest lost is forgotten first
 _STRIDE = 2.0  # of the prediction in retrospect [s]
 _BLUR = 9.0  # variance of the Gaussian that a particle stands for, at least [m²]
 _BANDWIDTH = 0.25  # more of it: so much of the cloud's, for n particles over their cube root
+
+
+def gain_of(bank: Bank, k: int, place: Floats, newcomers: float, blur: float = 0.0) -> float:
+    """Log of how much likelier a newborn's place is for the cloud `k` than for a newcomer.
+
+    Parameters
+    ----------
+    bank : Bank
+    k : int
+    place : (2, 6) float64 array
+        As `staniel.kernels.births.fit` gives it.
+    newcomers : float [1/m²]
+        Density of targets that were never seen.
+    blur : float [m]
+        Standard deviation that each particle stands for, beside the usual.
+    """
+    state, weights = bank.state[k], bank.weights[k]
+    own = _BANDWIDTH * weights.size ** (-1.0 / 3.0)
+    x, y = place[0, 0] - bank.origins[k, 0], place[1, 0] - bank.origins[k, 1]
+    xx = place[0, 2] + _BLUR + blur * blur + own * float(state[0].var())
+    yy = place[1, 2] + _BLUR + blur * blur + own * float(state[1].var())
+    square = (state[0] - x) ** 2 / xx + (state[1] - y) ** 2 / yy
+    density = float(weights @ np.exp(-0.5 * square)) / (2.0 * math.pi * math.sqrt(xx * yy))
+    return math.log(density + 1e-30) - math.log(newcomers)
 
 
 class Memory:
@@ -70,7 +94,10 @@ class Memory:
         from scipy.optimize import linear_sum_assignment
 
         gains = np.array(
-            [[self._gain(k, place) for place in places] for k in range(len(self._ids))]
+            [
+                [gain_of(self._bank, k, place, self._config.newcomers) for place in places]
+                for k in range(len(self._ids))
+            ]
         )
         claimed: list[TrackId | None] = [None] * len(places)
         for k, n in zip(*linear_sum_assignment(-np.maximum(gains, 0.0)), strict=True):
@@ -78,17 +105,6 @@ class Memory:
                 claimed[n] = self._ids[k]
         self.forget({id for id in claimed if id is not None})
         return claimed
-
-    def _gain(self, k: int, place: Floats) -> float:
-        """Log of how much likelier the place is for the lost target than for a newcomer."""
-        state, weights = self._bank.state[k], self._bank.weights[k]
-        own = _BANDWIDTH * weights.size ** (-1.0 / 3.0)
-        x, y = place[0, 0] - self._bank.origins[k, 0], place[1, 0] - self._bank.origins[k, 1]
-        xx = place[0, 2] + _BLUR + own * float(state[0].var())
-        yy = place[1, 2] + _BLUR + own * float(state[1].var())
-        square = (state[0] - x) ** 2 / xx + (state[1] - y) ** 2 / yy
-        density = float(weights @ np.exp(-0.5 * square)) / (2.0 * math.pi * math.sqrt(xx * yy))
-        return math.log(density + 1e-30) - math.log(self._config.newcomers)
 
     def _advance(self, now: float) -> None:
         while self._ids and self._time < now:

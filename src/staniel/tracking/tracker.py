@@ -19,7 +19,7 @@ from staniel.tracking.config import TrackingConfig
 from staniel.tracking.coverage import Coverage, checked_coverage
 from staniel.tracking.doubles import Doubles, dispersion
 from staniel.tracking.intake import Batch, Intake, Key
-from staniel.tracking.memory import Memory
+from staniel.tracking.memory import Memory, gain_of
 from staniel.tracking.nursery import Nursery
 
 __all__ = ["Tracker"]
@@ -29,6 +29,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _LOG_ODDS_LIMIT = math.log(999.0)
+_SURPRISE = 3.0  # by so much more than its particles a missed target may have moved [m a step]
 _AT_A_TRACK = -2  # owner of a free sighting that cannot start another track
 
 
@@ -364,11 +365,41 @@ class Tracker:
         self.returned = []
         newborn = self._nursery.step(free, now)
         newborn = [born for born in newborn if not self._occupied(born[0][:, 0].tolist())]
-        names = self._memory.claim([place for place, _ in newborn], now)
-        for (place, last_seen), name in zip(newborn, names, strict=True):
+        strangers = []
+        for place, last_seen in newborn:
+            missed = self._missed_at(place)
+            if missed is None:
+                strangers.append((place, last_seen))
+            else:
+                self._start_again(missed, place, last_seen, now)
+        names = self._memory.claim([place for place, _ in strangers], now)
+        for (place, last_seen), name in zip(strangers, names, strict=True):
             # Of two candidates at one place the first is a track by now.
             if not self._occupied(place[:, 0].tolist()):
                 self._launch(place, last_seen, now, name)
+
+    def _missed_at(self, place: Floats) -> int | None:
+        """The live track that has been missed since before a newborn was first seen, and may be it.
+
+        A target that suddenly drove off, say, left its particles behind.
+        """
+        c = self.config
+        missed = [k for k, track in enumerate(self._tracks) if track.unseen >= c.confirmations]
+        gains = [
+            gain_of(self._bank, k, place, c.newcomers, _SURPRISE * self._tracks[k].unseen)
+            for k in missed
+        ]
+        best = max(zip(gains, missed, strict=True), default=(0.0, -1))
+        return best[1] if best[0] > 0.0 else None
+
+    def _start_again(self, k: int, place: Floats, last_seen: float, now: float) -> None:
+        """A newborn takes over the name of the live track `k`, whose particles are given up."""
+        name = self._tracks[k].id
+        kept = [j for j in range(len(self._tracks)) if j != k]
+        self._tracks = [self._tracks[j] for j in kept]
+        self.estimates = [self.estimates[j] for j in kept]
+        self._bank.keep(kept)
+        self._launch(place, last_seen, now, name)
 
     def _occupied(self, place: list[float]) -> bool:
         return any(
