@@ -29,6 +29,10 @@ _F1 = np.float32(1.0)
 _TINY = np.float32(1e-12)
 _GOLDEN_32 = np.uint32(0x9E3779B9)
 _TWO_32 = np.float32(1.0 / 4294967296.0)
+_AWAY = tuple(
+    (np.float32(math.cos(math.radians(a))), np.float32(math.sin(math.radians(a))))
+    for a in (30.0, 60.0, 90.0, 120.0)
+)
 _BURIED = np.float32(math.log(0.3))  # weight left to a particle that stays inside a building
 _HASTE = 1.5  # no particle is faster than so many times the fastest that its track was, and
 _START = 8.0  # and anybody may drive off at this [m/s]
@@ -93,8 +97,9 @@ def _keep_to_streets(
 ) -> None:
     """Particles that drove into a building turn away from it; one that stays inside loses weight.
 
-    The first side that is free is taken, odd particles looking to the left and even ones to the
-    right before they look to the other side; where neither is, the particle turns round.
+    The least turn that is free is taken, in steps of 30 degrees: who grazes a wall goes on along
+    it. Odd particles look to the left and even ones to the right first; where nothing is free up
+    to 120 degrees, the particle turns round.
     """
     x, y, vx, vy = state[0], state[1], state[2], state[3]
     step = np.float32(dt)
@@ -107,15 +112,19 @@ def _keep_to_streets(
             continue
         side = _F1 if i % 2 == 1 else -_F1
         found = False
-        for _ in range(2):
-            new_x, new_y = old_x - side * vy[i] * step, old_y + side * vx[i] * step
-            if not _built(blocked, frame, origin[0] + new_x, origin[1] + new_y):
-                found = True
+        for c, sine in _AWAY:
+            for _ in range(2):
+                s = side * sine
+                new_vx, new_vy = c * vx[i] - s * vy[i], s * vx[i] + c * vy[i]
+                new_x, new_y = old_x + step * new_vx, old_y + step * new_vy
+                if not _built(blocked, frame, origin[0] + new_x, origin[1] + new_y):
+                    found = True
+                    break
+                side = -side
+            if found:
                 break
-            side = -side
         if found:
-            x[i], y[i] = new_x, new_y
-            vx[i], vy[i] = -side * vy[i], side * vx[i]
+            x[i], y[i], vx[i], vy[i] = new_x, new_y, new_vx, new_vy
         else:
             x[i], y[i] = old_x, old_y
             vx[i], vy[i] = -vx[i], -vy[i]

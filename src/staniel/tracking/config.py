@@ -22,7 +22,9 @@ class TrackingConfig(Config):
     speed_noise: float = Field(0.1, ge=0.0, le=50.0, description="speed's random walk [m/s/√s]")
     diffusion: float = Field(0.1, ge=0.0, le=100.0, description="position's random walk [m/√s]")
     turn_rate: float = Field(0.04, ge=0.0, le=10.0, description="turns to any course per second")
-    restart_rate: float = Field(0.03, ge=0.0, le=10.0, description="changes to any speed per second")
+    restart_rate: float = Field(
+        0.03, ge=0.0, le=10.0, description="changes to any speed per second"
+    )
     learning_time: float = Field(
         10.0, gt=0.0, le=3600.0, description="of learned dynamics, after which a turn is forgotten"
     )
