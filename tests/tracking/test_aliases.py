@@ -127,10 +127,7 @@ def disagreements(history):
 
 # ---------------------------------------------------------------- teams
 
-BUG = "Intake hands on its keys in the order of the call, its rows in order: owner_of mixes them up"
 
-
-@pytest.mark.xfail(strict=True, reason=BUG)
 def test_the_owner_of_a_sighting_does_not_depend_on_the_order_of_the_call():
     tracker = Tracker(LIGHT, rng=0)
     for k in range(5):
@@ -141,7 +138,6 @@ def test_the_owner_of_a_sighting_does_not_depend_on_the_order_of_the_call():
     assert owners == [track.id for track in near]
 
 
-@pytest.mark.xfail(strict=True, reason=BUG)
 @pytest.mark.parametrize("agents", [3, 4, 5])
 def test_names_agree_in_the_whole_team(agents):
     """No target has two names for more than 50 steps at a stretch, nine in ten for at most 30."""
@@ -155,7 +151,6 @@ def test_names_agree_in_the_whole_team(agents):
     assert ends == 40
 
 
-@pytest.mark.xfail(strict=True, reason=BUG)
 def test_nobody_cares_in_which_order_agents_step_and_reports_come():
     for seed in range(3):
         one, minds = fly(seed, 4)

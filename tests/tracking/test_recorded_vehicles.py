@@ -26,15 +26,6 @@ SIZE = (1200.0, 1700.0)
 MOST = 7.0
 pytestmark = pytest.mark.skipif(not ATHENS.is_file(), reason="no shared/data/trajectories")
 
-LOSES = (
-    "a vehicle that has stood and drives off is lost: motion.predict lets no particle be faster "
-    "than 1.5 times the track's fastest + 2 m/s; with _START = 8 and restart_rate = 0.1 none is"
-)
-MISNAMES = (
-    "a vehicle that covers more than cooperation.same_target between award and step gets two names "
-    "that are both held, and neither is given up"
-)
-
 
 def places_of():
     """(seconds + 1, 6, 2) places of the vehicles, which stand before and after their records."""
@@ -97,7 +88,6 @@ def test_tracks_are_nearer_than_what_was_seen(path, seed):
     assert identity_scores(truth, seen).idf1 > 0.5
 
 
-@pytest.mark.xfail(strict=True, reason=LOSES)
 def test_every_vehicle_keeps_its_track(path):
     switches = [identity_scores(*follow(path, seed)).switches for seed in range(4)]
     assert switches == [0, 0, 0, 0]
@@ -140,7 +130,6 @@ def of_agent(record, agent, time):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason=LOSES)
 def test_no_agent_of_a_mission_changes_a_name(flown):
     """After half a minute, in which the names are agreed."""
     record = flown.record
@@ -157,10 +146,8 @@ def test_no_agent_of_a_mission_changes_a_name(flown):
 
 
 @pytest.mark.slow
-def test_agents_call_a_vehicle_the_same(flown, request):
+def test_agents_call_a_vehicle_the_same(flown):
     """After half a minute: at least 98 % of the seconds of a vehicle it has one name."""
-    if request.node.callspec.params["flown"] == 1:
-        request.applymarker(pytest.mark.xfail(strict=True, reason=MISNAMES))
     record = flown.record
     names = names_of(record.vehicles[:, :, :2])
     one, all_ = 0, 0

@@ -404,8 +404,8 @@ def test_a_gimbal_keeps_the_record_and_the_world_of_one_mind(tmp_path):
 
 
 def test_a_delay_that_the_tracker_ignores_is_refused(tmp_path):
-    scenario = staniel.load_scenario("village", minutes=1.0, camera={"delay": 5.0})
-    with pytest.raises(ScenarioError, match=r"camera.delay = 5 s: expected at most"):
+    scenario = staniel.load_scenario("village", minutes=1.0, camera={"delay": 8.0})
+    with pytest.raises(ScenarioError, match=r"camera.delay = 8 s: expected at most"):
         staniel.fly(scenario, out=tmp_path / "run")
 
 
