@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from staniel.kernels.gating import gated
 from staniel.kernels.lanes import LANES, exp32, total_of
 
-__all__ = ["contested", "marginals", "paired", "rescore", "warm"]
+__all__ = ["contested", "density_at", "marginals", "paired", "rescore", "warm"]
 
 Array = NDArray[Any]
 
@@ -145,6 +145,45 @@ def paired(
 
 
 @njit(cache=True, error_model="numpy")
+def density_at(
+    state: Array, weights: Array, x: float, y: float, xx: float, yy: float, share: float
+) -> float:
+    """Density of a cloud at a place, each particle a Gaussian, by axis [1/m²].
+
+    Parameters
+    ----------
+    state : (4, n) float32 array
+    weights : (n,) float32 array
+        They sum to 1.
+    x, y : float [m]
+        From the cloud's origin.
+    xx, yy : float [m²]
+        Variance of a particle's Gaussian.
+    share : float
+        More of it: so much of the cloud's variance, weights apart.
+    """
+    n = weights.size
+    east, north = state[0], state[1]
+    mx, my, sx, sy = 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        mx += east[i]
+        my += north[i]
+    mx, my = mx / n, my / n
+    for i in range(n):
+        sx += (east[i] - mx) ** 2
+        sy += (north[i] - my) ** 2
+    xx, yy = xx + share * sx / n, yy + share * sy / n
+    ix, iy = np.float32(-0.5 / xx), np.float32(-0.5 / yy)
+    zx, zy = np.float32(x), np.float32(y)
+    buffer, lanes = np.empty(n, np.float32), np.empty(LANES, np.float32)
+    for i in range(n):
+        dx, dy = east[i] - zx, north[i] - zy
+        buffer[i] = weights[i] * exp32(ix * dx * dx + iy * dy * dy)
+    density: float = total_of(buffer, lanes) * np.exp(-_LOG_2PI) / np.sqrt(xx * yy)
+    return density
+
+
+@njit(cache=True, error_model="numpy")
 def marginals(pairs: Array, gains: Array, looks: Array, rounds: int) -> Array:
     """Share of each pair in its track's mixture: loopy belief propagation (Williams, Lau 2014).
 
@@ -208,3 +247,4 @@ def warm() -> None:
     square = np.eye(4).reshape(1, 4, 4)
     paired(np.zeros((1, 4)), square, state, weights, np.zeros((1, 2)), z, looks, 0.0, 4.0, 1.0, 0.5)
     marginals(pairs, one, looks, 5)
+    density_at(state[0], weights[0], 0.0, 0.0, 1.0, 1.0, 0.1)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from staniel.city import City
 from staniel.datatypes.belief import TrackId
+from staniel.kernels.association import density_at
 from staniel.tracking.bank import Bank
 from staniel.tracking.config import TrackingConfig
 
@@ -35,13 +36,17 @@ def gain_of(bank: Bank, k: int, place: Floats, newcomers: float, blur: float = 0
     blur : float [m]
         Standard deviation that each particle stands for, beside the usual.
     """
-    state, weights = bank.state[k], bank.weights[k]
-    own = _BANDWIDTH * weights.size ** (-1.0 / 3.0)
-    x, y = place[0, 0] - bank.origins[k, 0], place[1, 0] - bank.origins[k, 1]
-    xx = place[0, 2] + _BLUR + blur * blur + own * float(state[0].var())
-    yy = place[1, 2] + _BLUR + blur * blur + own * float(state[1].var())
-    square = (state[0] - x) ** 2 / xx + (state[1] - y) ** 2 / yy
-    density = float(weights @ np.exp(-0.5 * square)) / (2.0 * math.pi * math.sqrt(xx * yy))
+    own = _BANDWIDTH * bank.weights.shape[1] ** (-1.0 / 3.0)
+    more = _BLUR + blur * blur
+    density = density_at(
+        bank.state[k],
+        bank.weights[k],
+        float(place[0, 0] - bank.origins[k, 0]),
+        float(place[1, 0] - bank.origins[k, 1]),
+        float(place[0, 2]) + more,
+        float(place[1, 2]) + more,
+        own,
+    )
     return math.log(density + 1e-30) - math.log(newcomers)
 
 

@@ -340,7 +340,9 @@ class Tracker:
         ]
         self.lost = [self._tracks[k].known for k in expired]
         for k in expired:
-            self._memory.store(self._tracks[k].id, self._bank, k, now)
+            # Nobody comes back who hardly was there.
+            if self.estimates[k].existence >= c.least_existence:
+                self._memory.store(self._tracks[k].id, self._bank, k, now)
         if dropped or expired:
             kept = [k for k in range(len(self._tracks)) if k not in dropped and k not in expired]
             self._tracks = [self._tracks[k] for k in kept]
