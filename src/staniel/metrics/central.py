@@ -3,12 +3,20 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from staniel.city import City
 from staniel.datatypes.belief import Sighting
+from staniel.datatypes.equipment import Camera
+from staniel.datatypes.truth import FLYING
+from staniel.kernels.footprint import camera_axes, look
 from staniel.record import TRACK_DTYPE, Record
-from staniel.tracking import Tracker, TrackingConfig
+from staniel.tracking import Coverage, Tracker, TrackingConfig
+from staniel.tracking.coverage import Shows
 
 __all__ = ["central_fusion"]
+
+Floats = NDArray[np.float64]
 
 GROUND = -1
 """Agent number of a ground station."""
@@ -18,8 +26,9 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
     """The run's record with the tracks of a central tracker in place of the aircraft's own.
 
     One `Tracker`, the same that each aircraft carries, is given every sighting of every aircraft
-    when it was taken: no radio loses or delays one. All else, what was flown too, stays as it was,
-    so that the metrics of both records compare the two ways to fuse and nothing else.
+    when it was taken, and what each camera looked at: no radio loses or delays anything. All else,
+    what was flown too, stays as it was, so that the metrics of both records compare the two ways to
+    fuse and nothing else.
 
     Parameters
     ----------
@@ -47,8 +56,19 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
     tracker = Tracker(config, int(scenario["seed"]), founder=GROUND, chart=chart)
     rows = record.sightings
     until = np.searchsorted(rows["time"], record.times + 1e-6).tolist()
+    cameras, aims = record.cameras, record.looks(record.times)
+    flying = record.condition[:, :, FLYING] > 0.0
     tracks, first = [], 0
-    for time, last in zip(record.times.tolist(), until, strict=True):
+    for k, (time, last) in enumerate(zip(record.times.tolist(), until, strict=True)):
+        looks = [
+            Coverage(
+                None,
+                _view(chart, cameras[i], record.aircraft[k, i], aims[k, i]),
+                config.detection_probability,
+            )
+            for i in np.flatnonzero(flying[k]).tolist()
+            if chart is not None and cameras[i].delay == 0.0
+        ]
         sightings = [
             Sighting(
                 row["time"], np.array([row["x"], row["y"]]),
@@ -58,7 +78,7 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
             for row in rows[first:last]
         ]  # fmt: skip
         first = last
-        for track in tracker.step(time, sightings):
+        for track in tracker.step(time, sightings, looks or None):
             (xx, xy), (_, yy) = track.covariance.tolist()
             tracks.append(
                 (
@@ -67,3 +87,17 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
                 )
             )  # fmt: skip
     return replace(record, tracks=np.array(tracks, dtype=TRACK_DTYPE))
+
+
+def _view(city: City, camera: Camera, pose: Floats, aim: Floats) -> Shows:
+    """Which places a camera in `pose` sees, a gimballed one led to `aim`."""
+
+    def shows(places: Floats) -> NDArray[np.bool_]:
+        points = np.column_stack((places, np.full(len(places), camera.target_height)))
+        axes = camera_axes(pose[None], aim[None], camera.mounting)
+        seen: NDArray[np.bool_] = look(
+            city.walls, pose[None], axes, points, camera.half_aperture, camera.range
+        )[0]
+        return seen
+
+    return shows
