@@ -165,39 +165,52 @@ def correct(
             cov *= square
             cov[:4, :4] += rests[k]
             _draw_together(planes, mean, square)
-        done = np.zeros(last - first, np.bool_)
-        for p in range(first, last):
-            if done[p - first] or shares[p] == 0.0:
-                continue
-            hits[k] += 1
-            rivals = 0
-            for q in range(p, last):
-                if shares[q] > 0.0 and looks[pairs[q, 1]] == looks[pairs[p, 1]]:
-                    done[q - first] = True
-                    rivals += 1
-            if rivals > 1:
-                offsets[0, :] = np.float32(floor)
-            for q in range(p, last):
-                if shares[q] == 0.0 or looks[pairs[q, 1]] != looks[pairs[p, 1]]:
-                    continue
-                z, row = sightings[pairs[q, 1]], 0
-                for t in range(times_seen.size):
-                    if abs(times_seen[t] - z[0]) <= _SAME_TIME:
-                        row = 4 + 2 * t
-                _weigh(
-                    planes, row, log_weights[k], offsets, cov, z, origins[k], shares[q], floor,
-                    rivals == 1,
-                )  # fmt: skip
-            if rivals > 1:
-                logs, mixture = log_weights[k], offsets[0]
-                for i in range(n):
-                    logs[i] += log32(mixture[i])
+        hits[k] = _meet(
+            planes, times_seen, log_weights[k], offsets, cov, pairs[first:last, 1],
+            shares[first:last], looks, sightings, origins[k], floor,
+        )  # fmt: skip
         if late > 0:
             for row in range(4):
                 for i in range(n):
                     state[k, row, i] = planes[row, i]
         rests[k] = cov[:4, :4]
         first = last
+
+
+@njit(cache=True, error_model="numpy")
+def _meet(
+    planes: Array, late: Array, logs: Array, offsets: Array, covariance: Array, mine: Array,
+    shares: Array, looks: Array, sightings: Array, origin: Array, floor: float,
+) -> int:  # fmt: skip
+    """Let one track meet the sightings that it has a share in, look by look; returns the looks.
+
+    `late` are the times of which the planes from the fourth on are the places.
+    """
+    done, met = np.zeros(mine.size, np.bool_), 0
+    for p in range(mine.size):
+        if done[p] or shares[p] == 0.0:
+            continue
+        met += 1
+        rivals = 0
+        for q in range(p, mine.size):
+            if shares[q] > 0.0 and looks[mine[q]] == looks[mine[p]]:
+                done[q] = True
+                rivals += 1
+        if rivals > 1:
+            offsets[0, :] = np.float32(floor)
+        for q in range(p, mine.size):
+            if shares[q] == 0.0 or looks[mine[q]] != looks[mine[p]]:
+                continue
+            z, row = sightings[mine[q]], 0
+            for t in range(late.size):
+                if abs(late[t] - z[0]) <= _SAME_TIME:
+                    row = 4 + 2 * t
+            _weigh(planes, row, logs, offsets, covariance, z, origin, shares[q], floor, rivals == 1)
+        if rivals > 1:
+            mixture = offsets[0]
+            for i in range(logs.size):
+                logs[i] += log32(mixture[i])
+    return met
 
 
 @njit(cache=True, error_model="numpy")
