@@ -189,7 +189,7 @@ def _messages(truth, agent, own, belief, sightings):
     if target is not None and truth.tick % 20 == agent:
         other = (agent + 1) % len(truth.aircraft)
         yield Announce(agent, number + 2, time, target, place, 0.5, 120.0)
-        yield Bid(agent, number + 3, time, target, other, 130.25)
+        yield Bid(agent, number + 3, time, (target,), (other,), (130.25,))
         yield Award(agent, number + 4, time, target, place, other, 99.5)
         yield Revoke(agent, number + 5, time, target, other, target, place, 88.0)
         yield Release(agent, number + 6, time, target, place, True)

@@ -132,7 +132,7 @@ def test_sizes_on_the_air():
     assert wire_size(replace(heartbeat, command=banks)) == 75 + 13 + 1 + 2 * 2
     led = replace(banks, look=(3.0, 4.0))
     assert wire_size(replace(heartbeat, command=led)) == 75 + 13 + 1 + 2 * 2 + 8
-    assert wire_size(Bid(0, 1, 0.0, target=name, auctioneer=1, cost=1.0)) == 36
+    assert wire_size(Bid(0, 1, 0.0, targets=(name,), auctioneers=(1,), costs=(1.0,))) == 36
     assert wire_size(Award(0, 1, 0.0, target=name, position=(0, 0), winner=1, cost=1.0)) == 44
     assert wire_size(Release(0, 1, 0.0, target=name, position=(0, 0), lost=True)) == 39
     disc = RiskRegion(kind="threat", center=(0.0, 0.0), radius=9.0, rate=1.0)

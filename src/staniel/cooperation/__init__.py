@@ -1,6 +1,6 @@
 """What the team agrees: who watches which target, and where to search."""
 
-from staniel.cooperation.auction import Allocation, Holding, Task
+from staniel.cooperation.allocation import Allocation, Holding, Task
 from staniel.cooperation.config import CooperationConfig
 from staniel.cooperation.helping import Helping
 from staniel.cooperation.search import SearchMap

@@ -18,7 +18,7 @@ warn           head; for each region 15: kind 1, corners 2, rate, floor, ceiling
                each corner, or 12 for a disc; for each carrier 38: time 8, point, covariance 12,
                reporter 2, radius and rate 4 each
 announce       head, track name, point, course 4, cost
-bid            head, track name, auctioneer 2, cost
+bid            head, and for each target a track name, auctioneer 2, cost
 award          head, track name, point, winner 2, cost
 revoke         head, two track names, auctioneer 2, point, cost
 release        head, track name, point, lost 1
@@ -59,7 +59,7 @@ _SIZES: Final[dict[type[Message], int]] = {
     Report: HEAD,
     Warn: HEAD,
     Announce: HEAD + _NAME + _POINT + 4 + _COST,
-    Bid: HEAD + _NAME + 2 + _COST,
+    Bid: HEAD,
     Award: HEAD + _NAME + _POINT + 2 + _COST,
     Revoke: HEAD + 2 * _NAME + 2 + _POINT + _COST,
     Release: HEAD + _NAME + _POINT + 1,
@@ -78,6 +78,8 @@ def wire_size(message: Message) -> int:
     if isinstance(message, Heartbeat):
         size += _NAME if message.helps is not None else 0
         size += _command_size(message.command)
+    elif isinstance(message, Bid):
+        size += (_NAME + 2 + _COST) * len(message.targets)
     elif isinstance(message, Report):
         size += SIGHTING * len(message.sightings)
         size += _NAME * sum(name is not None for name in message.names)

@@ -249,7 +249,7 @@ def _contents(message: Message) -> tuple[object | None, int | None, float, float
             return target, None, cost, x, y
         case Revoke(target=target, position=(x, y), cost=cost):
             return target, None, cost, x, y
-        case Bid(target=target, cost=cost):
+        case Bid(targets=(target, *_), costs=(cost, *_)):
             return target, None, cost, math.nan, math.nan
         case Release(target=target, position=(x, y)):
             return target, None, math.nan, x, y

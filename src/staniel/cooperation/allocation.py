@@ -235,9 +235,12 @@ class Allocation:
                 self._hear_heartbeat(message)
             case Announce():
                 self._hear_announce(message)
-            case Bid(target=target, auctioneer=auctioneer, cost=cost, sender=sender):
-                if auctioneer == self._agent and target in self._auctions:
-                    self._auctions[target].bids.append((cost, -sender))
+            case Bid(sender=sender):
+                for target, auctioneer, cost in zip(
+                    message.targets, message.auctioneers, message.costs, strict=True
+                ):
+                    if auctioneer == self._agent and target in self._auctions:
+                        self._auctions[target].bids.append((cost, -sender))
             case Award():
                 self._hear_award(message)
             case Revoke():
@@ -303,7 +306,7 @@ class Allocation:
                 *message.position, message.course, self._radius,
             )  # fmt: skip
             if cost <= message.cost:
-                self._say(Bid, target=target, auctioneer=message.sender, cost=cost)
+                self._say(Bid, targets=(target,), auctioneers=(message.sender,), costs=(cost,))
 
     def _hear_award(self, message: Award) -> None:
         target = message.target
