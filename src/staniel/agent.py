@@ -13,8 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
-from staniel.cooperation import Allocation, CooperationConfig, Helping, SearchMap, Task
-from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstimate, TrackId
+from staniel.cooperation import (
+    Allocation,
+    Assistance,
+    CooperationConfig,
+    CostModel,
+    Goal,
+    Holding,
+    SearchMap,
+    Situation,
+    Task,
+)
+from staniel.datatypes.belief import Belief, Percept, Pose, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyBanks, FlyLine, look_point
 from staniel.datatypes.equipment import Airframe, Camera, Lidar
@@ -28,14 +38,23 @@ from staniel.guidance import (
     Pursuit,
     avoidance_for,
     loiter,
+    predicted_visibility,
     pursuit_policy_named,
     safe_loiter,
 )
-from staniel.kernels.dubins import shortest
 from staniel.kernels.footprint import camera_axes, look
-from staniel.tracking import Aliases, Coverage, Tracker, TrackingConfig
+from staniel.tracking import Coverage, Picture, TrackingConfig
 
 __all__ = ["Agent", "Briefing"]
+
+_FORESEEN = 16
+"""Particles by which the agent foresees what it will see."""
+
+_FORESIGHT_TICKS = 5.0
+"""Over which that is averaged."""
+
+_LONGEST_WAY = 120.0
+"""A target is given up when the agent has not come near its place by then [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +75,8 @@ class Briefing:
     risk: tuple[RiskRegion, ...] = ()
     carried: CarriedThreat | None = None
     lidar: Lidar = Lidar()  # noqa: RUF009 - frozen
+    centre: int | None = None
+    """Id of the ground station that shares targets out, where one does."""
 
 
 class Agent:
@@ -80,15 +101,20 @@ class Agent:
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
         airframe, clock = briefing.airframe, briefing.clock
         self.id, self._briefing = id, briefing
-        self._tracker = Tracker(briefing.tracking, rng, founder=id, chart=briefing.chart)
-        self._aliases = Aliases()
+        self._picture = Picture(briefing.tracking, rng, id, briefing.chart)
+        self._tracker = self._picture.tracker
         self._allocation = Allocation(
             id,
             briefing.cooperation,
-            turn_radius=airframe.min_turn_radius,
             step=clock.decision_step,
+            centre=briefing.centre,
         )
-        self._helping = Helping(id, briefing.cooperation)
+        self._assistance = Assistance(id, briefing.cooperation, step=clock.decision_step)
+        self._costs = CostModel(
+            briefing.cooperation.cost, airframe, briefing.camera, briefing.chart
+        )
+        self._visibility = 1.0
+        self._arrived: float | None = None
         self._search = SearchMap(
             briefing.chart, airframe, briefing.camera, cell=briefing.cooperation.search_cell
         )
@@ -128,7 +154,8 @@ class Agent:
         news = self.dangers.step(time, percept.threats, warned)
         tracks = self._track(percept, inbox)
         outbox = self._allocate(percept, tracks, inbox)
-        command, role, goal = self._fly(time, pose, inbox, outbox)
+        command, role, goal = self._fly(percept, inbox, outbox)
+        self._foresee(pose, command)
         command, guard = self._avoid(percept, inbox, command)
         self._look = look_point(command)
         if percept.sightings:
@@ -146,7 +173,11 @@ class Agent:
         # Partners and those who avoid one another want to know what is flown.
         planned = role in ("pursue", "help") and isinstance(command, FlyBanks)
         told = command if planned or self._avoidance is not None else None
-        outbox.append(self._allocation.heartbeat(role, goal, self._helping.target, told))
+        outbox.append(
+            self._allocation.heartbeat(
+                role, goal, self._assistance.target, told, self._assistance.helpers
+            )
+        )
         held = self._allocation.holding
         target = None if held is None else held.id
         self.belief = Belief(self._tracker.estimates, role, target, goal, guard)
@@ -163,21 +194,13 @@ class Agent:
 
     def _track(self, percept: Percept, inbox: Sequence[Message]) -> list[TrackEstimate]:
         """Own sightings and those of the others, fused in one tracker."""
-        reports = [message for message in inbox if isinstance(message, Report)]
-        sightings: list[Sighting] = list(percept.sightings)
-        for report in reports:
-            sightings.extend(report.sightings)
-        tracks = self._tracker.step(percept.time, sightings, self._coverage(percept))
-        told = [
-            (report.sender, report.time, own, name)
-            for report in reports
-            for seen, name in zip(report.sightings, report.names, strict=False)
-            if name is not None and (own := self._tracker.owner_of(seen)) is not None
-        ]
-        live = [track.id for track in tracks]
-        for old, new in self._aliases.step(told, live, self._allocation.held):
-            self._tracker.rename(old, new)
-        return list(self._tracker.estimates)
+        return self._picture.step(
+            percept.time,
+            percept.sightings,
+            inbox,
+            self._coverage(percept),
+            self._allocation.held,
+        )
 
     def _coverage(self, percept: Percept) -> list[Coverage] | None:
         """What the own camera has just looked at; not known of one whose pictures come late."""
@@ -200,26 +223,71 @@ class Agent:
     def _allocate(
         self, percept: Percept, tracks: list[TrackEstimate], inbox: Sequence[Message]
     ) -> list[Message]:
-        """Auctions: what the tracks cost this aircraft, what the others said, who watches what."""
-        outbox = self._allocation.step(
-            percept.time, percept.pose, self._tasks(percept, tracks), inbox
+        """Auctions and help: what the tracks cost, what the others said, who watches what."""
+        time, pose, config = percept.time, percept.pose, self._briefing.cooperation
+        health, allocation = percept.health, self._allocation
+        fit = "blind" if not health.camera else "weak" if health.energy < config.weak_below else ""
+        dangers = self.dangers.at(time, tracks)
+        situation = Situation(pose, health.energy, health.camera, dangers.rate if dangers else None)
+
+        outbox = allocation.step(
+            time,
+            pose,
+            self._tasks(percept, tracks, situation),
+            inbox,
+            lambda goals: self._costs.prices(situation, goals),
+            health=fit or "healthy",
+            alone=config.mode == "none" or not health.radio,
         )
-        for old, new in self._allocation.renames:
+        for old, new in allocation.renames:
             self._tracker.rename(old, new)
-        free = self._allocation.holding is None
-        self._helping.step(percept.time, percept.pose, free, inbox)
+        able = allocation.holding is None and not fit
+        said = self._assistance.step(
+            time, pose, allocation.holding, self._need_of_help(), able, inbox
+        )
+        outbox += [
+            kind(self.id, allocation.next_sequence(), time, **content) for kind, content in said
+        ]
         return outbox
 
-    def _tasks(self, percept: Percept, tracks: list[TrackEstimate]) -> list[Task]:
+    def _need_of_help(self) -> str | None:
+        """Why the agent wants another beside it, if it does (thesis section 7.2.1.1)."""
+        config = self._briefing.cooperation
+        if config.assistance == "always":
+            return "value"
+        if self.belief.guard:
+            return "avoidance"
+        return "visibility" if self._visibility < config.ask_below else None
+
+    def _foresee(self, pose: Pose, command: Command) -> None:
+        """Keep the mean of late of what the agent expects to see of what it holds."""
+        briefing, held = self._briefing, self._allocation.holding
+        track = None if held is None else self._track_named(held.id)
+        if track is None or briefing.cooperation.assistance == "none":
+            self._visibility = 1.0
+            return
+        cloud = self._tracker.particles(track.id)
+        share = predicted_visibility(
+            pose,
+            command,
+            cloud[:: max(len(cloud) // _FORESEEN, 1)],
+            briefing.airframe,
+            briefing.camera,
+            briefing.chart,
+            self._look,
+        )
+        self._visibility += (share - self._visibility) / _FORESIGHT_TICKS
+
+    def _tasks(
+        self, percept: Percept, tracks: list[TrackEstimate], situation: Situation
+    ) -> list[Task]:
         if not tracks:
             return []
-        pose = percept.pose
-        goals = [(*track.position.tolist(), track.course) for track in tracks]
-        costs = shortest(
-            np.array(((pose.x, pose.y, pose.heading),)),
-            np.array(goals),
-            self._briefing.airframe.min_turn_radius,
-        )[0].tolist()
+        places = [(*track.position.tolist(),) for track in tracks]
+        goals = [
+            Goal(place, track.course, track.speed)
+            for place, track in zip(places, tracks, strict=True)
+        ]
         own = [tuple(sighting.position.tolist()) for sighting in percept.sightings]
         # Sightings may be older than the percept that hands them out.
         looked = min((sighting.time for sighting in percept.sightings), default=math.inf)
@@ -227,25 +295,31 @@ class Agent:
         return [
             Task(
                 track.id,
-                (x, y),
-                course,
-                cost,
-                track.last_seen >= looked and any(math.dist((x, y), z) < near for z in own),
+                place,
+                goal.course,
+                price.cost,
+                track.last_seen >= looked and any(math.dist(place, z) < near for z in own),
+                price.terms,
+                (*track.velocity.tolist(),),
+                track.last_seen,
             )
-            for track, (x, y, course), cost in zip(tracks, goals, costs, strict=True)
+            for track, place, goal, price in zip(
+                tracks, places, goals, self._costs.prices(situation, goals), strict=True
+            )
         ]
 
     def _fly(
-        self, time: float, pose: Pose, inbox: Sequence[Message], outbox: list[Message]
+        self, percept: Percept, inbox: Sequence[Message], outbox: list[Message]
     ) -> tuple[Command, str, Point]:
-        """Pursue the held target; else loiter where one was lost; else search."""
+        """Pursue the held target; else help; else loiter where one was lost; else search."""
+        time, pose = percept.time, percept.pose
         heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
         self._search.look(
             time,
             [pose, *(message.pose for message in heartbeats)],
             [self.belief.goal, *(message.goal for message in heartbeats)],
         )
-        held, guidance = self._allocation.holding, self._briefing.guidance
+        held = self._allocation.holding
         if held is not None:
             track = self._track_named(held.id)
             if track is not None:
@@ -253,36 +327,55 @@ class Agent:
                 self._last_place = (held.position, time)
                 self._search.forget_goal()
                 return *self._chase(time, pose, track, "pursue"), held.position
-            since = max(self._seen_holding, held.since)
-            if self._tracker_lost(held.id) or time - since > guidance.recover_time:
-                outbox.append(self._allocation.give_up())
-            self._last_place = (held.position, since)
-        if self._helping.target is not None:
-            return self._help(time, pose, self._helping.target)
+            self._give_up_in_time(time, pose, held, outbox)
+        if self._assistance.target is not None:
+            return self._help(time, pose, self._assistance.target)
         if self._last_place is not None:
             place, since = self._last_place
-            if time - since <= guidance.recover_time:
+            if time - since <= self._briefing.guidance.recover_time:
                 self._search.forget_goal()
-                command = loiter(pose, place, self._briefing.airframe, guidance)
-                return command, "recover", place
+                return self._circle(pose, place), "recover", place
             self._last_place = None
+        if not percept.health.camera:
+            place = (pose.x, pose.y) if self.belief.role != "standby" else self.belief.goal
+            return self._circle(pose, place), "standby", place
         others = [message.goal for message in heartbeats if message.role == "search"]
         start, goal = self._search.leg(time, pose, others)
         airframe = self._briefing.airframe
         return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
 
+    def _give_up_in_time(
+        self, time: float, pose: Pose, held: Holding, outbox: list[Message]
+    ) -> None:
+        """Let go of a target without a track that was not found for long where it was last."""
+        patience = self._briefing.guidance.recover_time
+        since = max(self._seen_holding, held.since)
+        if self._arrived is None or self._arrived < since:
+            near = 3.0 * self._briefing.airframe.min_turn_radius
+            if math.dist(held.position, (pose.x, pose.y)) < near:
+                self._arrived = time
+            elif time - since < _LONGEST_WAY:
+                since = time
+        if self._arrived is not None:
+            since = max(since, self._arrived)
+        if self._tracker_lost(held.id) or time - since > patience:
+            outbox.append(self._allocation.give_up())
+        self._last_place = (held.position, since)
+
+    def _circle(self, pose: Pose, place: Point) -> Command:
+        return loiter(pose, place, self._briefing.airframe, self._briefing.guidance)
+
     def _help(self, time: float, pose: Pose, target: TrackId) -> tuple[Command, str, Point]:
-        """Pursue what another holds; circle where it is said to be until an own track says it."""
+        """Plan with the holder where the policy can; else circle midway to it (thesis 7.2.1.1)."""
         self._last_place = None
         self._search.forget_goal()
-        place, track = self._helping.position, self._track_named(target)
-        if track is None:
-            return (
-                loiter(pose, place, self._briefing.airframe, self._briefing.guidance),
-                "help",
-                place,
-            )
-        return *self._chase(time, pose, track, "help"), place
+        place, track = self._assistance.position, self._track_named(target)
+        if track is not None and self._briefing.guidance.pursuit == "lookahead":
+            return *self._chase(time, pose, track, "help"), place
+        holder = self._assistance.holder_pose
+        if holder is not None:
+            place = ((place[0] + holder.x) / 2.0, (place[1] + holder.y) / 2.0)
+        return self._circle(pose, place), "help", place
 
     def _chase(
         self, time: float, pose: Pose, track: TrackEstimate, role: str
@@ -312,7 +405,7 @@ class Agent:
                     beat.pose,
                     beat.command if isinstance(beat.command, FlyBanks) else None,
                 )
-                for beat in self._helping.partners(track.id)
+                for beat in self._assistance.partners(track.id)
             ),
             look=self._look,
             memory=self._memory,

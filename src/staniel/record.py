@@ -74,7 +74,7 @@ TRACK_DTYPE = _columns(
     "time:f8 agent:i4 id:U16 x:f8 y:f8 vx:f8 vy:f8 cxx:f8 cxy:f8 cyy:f8 existence:f8 last_seen:f8"
 )
 MESSAGE_DTYPE = _columns(
-    "time:f8 sender:i4 sequence:i8 kind:U12 target:U16 winner:i4 cost:f8 x:f8 y:f8 "
+    "time:f8 sender:i4 sequence:i8 kind:U20 target:U16 winner:i4 cost:f8 x:f8 y:f8 "
     "receivers:i4 heard:i4"
 )
 COMMAND_DTYPE = _columns(

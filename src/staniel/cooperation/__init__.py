@@ -1,8 +1,22 @@
-"""What the team agrees: who watches which target, and where to search."""
+"""What the team agrees: who watches which target, who helps whom, and where to search."""
 
-from staniel.cooperation.allocation import Allocation, Holding, Task
-from staniel.cooperation.config import CooperationConfig
-from staniel.cooperation.helping import Helping
+from staniel.cooperation.allocation import Allocation
+from staniel.cooperation.assistance import Assistance
+from staniel.cooperation.config import CooperationConfig, CostConfig
+from staniel.cooperation.cost import CostModel, Goal, Price, Situation
 from staniel.cooperation.search import SearchMap
+from staniel.cooperation.table import Holding, Task
 
-__all__ = ["Allocation", "CooperationConfig", "Helping", "Holding", "SearchMap", "Task"]
+__all__ = [
+    "Allocation",
+    "Assistance",
+    "CooperationConfig",
+    "CostConfig",
+    "CostModel",
+    "Goal",
+    "Holding",
+    "Price",
+    "SearchMap",
+    "Situation",
+    "Task",
+]

@@ -1,29 +1,79 @@
 """How the team shares its targets out and where it searches."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from staniel.datatypes.config import Config
 
-__all__ = ["CooperationConfig"]
+__all__ = ["CooperationConfig", "CostConfig"]
+
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Weight = Annotated[float, Field(ge=0.0, le=1e6)]
+
+
+class CostConfig(Config):
+    """What a target costs beside the Dubins distance to it, each as so many metres more."""
+
+    energy: Weight = Field(0.0, description="of an aircraft with no energy left [m]")
+    exposure: Weight = Field(0.0, description="for each loss expected on the way [m]")
+    visibility: Weight = Field(0.0, description="of a target hidden from all around [m]")
+    sensor: Weight = Field(0.0, description="of a camera that detects nothing [m]")
+    speed: Weight = Field(0.0, description="of a target as fast as the aircraft can fly [m]")
+    priority: Weight = Field(0.0, description="less, for a target of priority 1 [m]")
 
 
 class CooperationConfig(Config):
-    """The auction's patience, the hand-over margin, the search map."""
+    """The auction's patience, the hand-over margin, help, revisits, the search map."""
 
-    mode: Literal["decentralised"] = Field("decentralised", description="who auctions")
+    mode: Literal["decentralised", "centralised", "none"] = Field(
+        "decentralised",
+        description="who shares targets out: auctions, a ground station, or nobody: "
+        "each follows the nearest that it sees",
+    )
+    award: Literal["lowest", "joint"] = Field(
+        "joint",
+        description="an auctioneer awards to the lowest bid, or by the best assignment of all "
+        "open auctions that it hears of",
+    )
     bid_wait: int = Field(
         2, ge=1, le=10, description="ticks that an auctioneer waits for bids, without the latency"
     )
-    lease: float = Field(8.0, gt=0.0, description="an award without a heartbeat ends after [s]")
-    handover_margin: float = Field(
-        80.0, ge=0.0, description="Dubins length that a hand-over must save [m]"
+    award_tries: int = Field(
+        3, ge=1, le=20, description="how often an award is said while nobody acknowledges it"
     )
+    lease: float = Field(8.0, gt=0.0, description="an award without a heartbeat ends after [s]")
+    handover_margin: float = Field(80.0, ge=0.0, description="cost that a hand-over must save [m]")
     same_target: float = Field(
         12.0, gt=0.0, description="two reports this close are one target [m]"
     )
-    search_cell: float = Field(20.0, gt=0.0, description="cell of the search map [m]")
-    helpers: int = Field(
-        0, ge=0, le=10, description="free aircraft that join each one which holds a target"
+    weak_below: float = Field(
+        0.1, ge=0.0, le=1.0, description="share of the energy below which an aircraft is relieved"
     )
+    assistance: Literal["none", "asked", "always"] = Field(
+        "none", description="when a free aircraft joins the holder of a target"
+    )
+    helpers: int = Field(
+        1, ge=0, le=10, description="free aircraft that join each one which holds a target, at most"
+    )
+    ask_below: float = Field(
+        0.5, ge=0.0, le=1.0, description="predicted visibility below which a holder asks for help"
+    )
+    revisit_after: float = Field(
+        45.0,
+        ge=0.0,
+        description="a holder leaves its target for one that nobody holds and nobody has seen "
+        "for this long; 0: never [s]",
+    )
+    revisit_dwell: float = Field(
+        15.0, ge=0.0, description="a target is held at least so long before it is left [s]"
+    )
+    unheld_memory: float = Field(
+        120.0, ge=0.0, description="a target that nobody holds is remembered for [s]"
+    )
+    station: tuple[Coordinate, Coordinate] | None = Field(
+        None, description="of the centralised mode; not set: the city's south-west corner [m]"
+    )
+    search_cell: float = Field(20.0, gt=0.0, description="cell of the search map [m]")
+    cost: CostConfig = CostConfig()

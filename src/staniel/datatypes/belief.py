@@ -12,7 +12,7 @@ from staniel.datatypes.checks import checked_covariance, checked_floats
 from staniel.datatypes.lidar import LidarScan
 from staniel.datatypes.threats import NO_THREATS, Threats
 
-__all__ = ["Belief", "Percept", "Pose", "Sighting", "TrackEstimate", "TrackId"]
+__all__ = ["Belief", "Health", "Percept", "Pose", "Sighting", "TrackEstimate", "TrackId"]
 
 
 class Pose(NamedTuple):
@@ -161,15 +161,24 @@ class TrackEstimate:
         return self.position + seconds * self.velocity
 
 
+class Health(NamedTuple):
+    """What an aircraft knows of itself: do camera and radio work, what share of energy is left."""
+
+    camera: bool = True
+    radio: bool = True
+    energy: float = 1.0
+
+
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """What one aircraft perceives in one tick: navigation, camera, lidar and threat sensor."""
+    """What one aircraft perceives in one tick: navigation, camera, lidar, threat sensor, itself."""
 
     time: float
     pose: Pose
     sightings: tuple[Sighting, ...]
     lidar: LidarScan | None = None
     threats: Threats = NO_THREATS
+    health: Health = Health()  # noqa: RUF009 - immutable
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,8 +189,8 @@ class Belief:
     ----------
     tracks : sequence of TrackEstimate
     role : str
-        ``"search"``, ``"pursue"``, ``"help"``, ``"recover"``, or ``"loiter"`` where
-        its policy found no flight that is safe.
+        ``"search"``, ``"pursue"``, ``"help"``, ``"recover"``, ``"standby"`` where it cannot see,
+        or ``"loiter"`` where its policy found no flight that is safe.
     target : TrackId or None
         The track it is responsible for.
     goal : (float, float) [m]

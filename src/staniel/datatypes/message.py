@@ -20,6 +20,7 @@ __all__ = [
     "AssistanceOffer",
     "AssistanceRequest",
     "Award",
+    "Beacon",
     "Bid",
     "Bundle",
     "Claim",
@@ -33,6 +34,7 @@ __all__ = [
     "Release",
     "Report",
     "Revoke",
+    "Unheld",
     "Warn",
 ]
 
@@ -65,6 +67,15 @@ class Message:
         return type(self).__name__.lower()
 
 
+class Unheld(NamedTuple):
+    """A target that nobody holds: where it was [m], which way it drove [rad], when seen [s]."""
+
+    target: TrackId
+    position: Point
+    course: float
+    seen: float
+
+
 @dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
     """I am alive, here, doing this. A held target's award is a lease that this renews.
@@ -83,8 +94,11 @@ class Heartbeat(Message):
         Of holding it; infinite without a target.
     helps : TrackId or None
         The target that the sender watches beside its holder.
-    helper : int or None
-        Whom the sender, a holder, took as its helper.
+    helpers : tuple of int
+        Whom the sender, a holder, took as its helpers.
+    unheld : tuple of Unheld
+        Targets that the sender knows and nobody holds, as far as it knows; the longest unseen
+        first.
     health : str
         ``"healthy"``, ``"blind"`` (its camera is dead) or ``"weak"`` (little energy left).
     command : Command or None
@@ -100,8 +114,9 @@ class Heartbeat(Message):
     helps: TrackId | None = None
     command: Command | None = None
     target_velocity: Point = (0.0, 0.0)
-    helper: int | None = None
+    helpers: tuple[int, ...] = ()
     health: str = "healthy"
+    unheld: tuple[Unheld, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +139,11 @@ class Looked(Message):
     """Which street cells were looked at when, as `staniel.cooperation.SearchMap` packs it."""
 
     cells: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Beacon(Message):
+    """I am the ground station, and I share the targets out: my awards are orders."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from staniel.guidance.following import (
     line_course,
     orbit_course,
 )
+from staniel.guidance.foresight import predicted_visibility
 from staniel.guidance.loiter import loiter, safe_loiter
 from staniel.guidance.lookahead import lookahead
 from staniel.guidance.orbit import best_radius, orbit
@@ -63,6 +64,7 @@ __all__ = [
     "lookahead",
     "orbit",
     "orbit_course",
+    "predicted_visibility",
     "pursuit_names",
     "pursuit_policy",
     "pursuit_policy_named",

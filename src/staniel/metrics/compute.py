@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from staniel.metrics.custody import custody_metrics
 from staniel.metrics.dangers import danger_metrics, noticed_metrics
 from staniel.metrics.flown import aircraft_metrics
 from staniel.metrics.following import follow
@@ -57,6 +58,7 @@ def compute_metrics(record: Record) -> dict[str, Any]:
         "team": {
             **team_metrics(record, following, targets),
             **team_causes,
+            **custody_metrics(record),
             "risk_noticed": noticed_metrics(record),
         },
     }

@@ -295,7 +295,7 @@ def _threat(_: float, item: Mapping[str, Any]) -> Row:
 def _message(_: float, item: Mapping[str, Any]) -> Row:
     winner = item["winner"]
     return (
-        item["time"], item["sender"], item["sequence"], _text(item["kind"], 12),
+        item["time"], item["sender"], item["sequence"], _text(item["kind"], 20),
         _text(item["target"], 16), -1 if winner is None else winner, _or_nan(item["cost"]),
         _or_nan(item["x"]), _or_nan(item["y"]), item["receivers"], len(item["heard_by"]),
     )  # fmt: skip

@@ -9,13 +9,15 @@ from staniel.agent import Agent, Briefing
 from staniel.city import City
 from staniel.cooperation import CooperationConfig
 from staniel.errors import ScenarioError
-from staniel.mission import Mission
+from staniel.ground import Ground, GroundBriefing
+from staniel.mission import Mission, Station
 from staniel.scenario.model import Scenario
 from staniel.world import Lidars, MixedCameras, Radio, ThreatSensors, World
 
 __all__ = ["assemble", "kernels_of"]
 
 _ROUNDING = 1e-9  # of a tick
+_MAST = 10.0  # height of a ground station's antenna [m]
 
 
 def assemble(scenario: Scenario, city: City) -> Mission:
@@ -40,8 +42,10 @@ def assemble(scenario: Scenario, city: City) -> Mission:
     ScenarioError
         An aircraft or a vehicle has no place in this city, or sightings would come too late.
     """
-    seeds = np.random.SeedSequence(scenario.seed).spawn(6)
-    world_seed, camera_seed, radio_seed, agent_seed, lidar_seed, threat_seed = seeds
+    seeds = np.random.SeedSequence(scenario.seed).spawn(7)
+    (
+        world_seed, camera_seed, radio_seed, agent_seed, lidar_seed, threat_seed, station_seed,
+    ) = seeds  # fmt: skip
     team, clock = scenario.aircraft, scenario.clock
     cameras, airframes = scenario.cameras, scenario.airframes
     slowest = max(camera.delay for camera in cameras)
@@ -62,6 +66,7 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         risk=scenario.risk.briefed,
         carried=scenario.risk.carried.briefing,
         lidar=scenario.lidar,
+        centre=team.count if scenario.cooperation.mode == "centralised" else None,
     )
     world = World(
         city,
@@ -100,6 +105,22 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         ticks=round(scenario.minutes * 60.0 / clock.decision_step),
         lidars=None if lidar.mount == "none" else Lidars(city, lidar, lidar_seed),
         threat_sensors=ThreatSensors(city, risk, threat_seed) if risk.sensor.range else None,
+        station=_station(scenario, briefing, station_seed),
+    )
+
+
+def _station(
+    scenario: Scenario, briefing: Briefing, seed: np.random.SeedSequence
+) -> Station | None:
+    """The ground node, where the mode has one."""
+    config = briefing.cooperation
+    if config.mode != "centralised":
+        return None
+    told = GroundBriefing(briefing.chart, briefing.airframe, briefing.tracking, config)
+    ground = Ground(scenario.aircraft.count, told, np.random.default_rng(seed))
+    silent = scenario.faults.station
+    return Station(
+        ground, (*(config.station or (0.0, 0.0)), _MAST), math.inf if silent is None else silent
     )
 
 

@@ -85,6 +85,8 @@ _TEAM: Final = {
     "false_tracks": Metric("false tracks", "", "lower"),
     "auctions": Metric("auctions"),
     "handovers": Metric("hand-overs"),
+    "double_held_longest": Metric("longest with two holders in reach", "s", "lower"),
+    "orphaned_longest": Metric("longest unheld with a free aircraft in reach", "s", "lower"),
     "messages_sent": Metric("messages sent"),
     "messages_delivered": Metric("messages delivered"),
     "messages_possible": Metric("messages possible"),

@@ -93,6 +93,9 @@ class Faults(Config):
     drift_rate: float = Field(
         1.0, ge=0.0, le=100.0, description="of a navigation that drifts, one direction each [m/s]"
     )
+    station: float | None = Field(
+        None, ge=0.0, description="the ground station, if any, falls silent; not set: never [s]"
+    )
     rate_per_hour: FaultRates = FaultRates()
 
 

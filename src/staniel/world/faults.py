@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.datatypes.belief import Percept, Pose, Sighting
-from staniel.datatypes.truth import CAMERA, DRIFT_X, DRIFT_Y, Truth
+from staniel.datatypes.belief import Health, Percept, Pose, Sighting
+from staniel.datatypes.truth import CAMERA, DRIFT_X, DRIFT_Y, ENERGY, RADIO, Truth
 from staniel.errors import ScenarioError
 from staniel.kernels.random import fold, uniform
 from staniel.world.config import Faults
@@ -88,7 +88,7 @@ class Failures:
 
 
 def impair(percepts: Sequence[Percept], truth: Truth) -> list[Percept]:
-    """What is left of the percepts where navigation is off: own pose and scan are shifted.
+    """The percepts with each aircraft's health, and shifted where its navigation is off.
 
     Sightings are impaired when they are taken, not when they arrive: see `taken`. What the threat
     sensor noticed is mapped from the own pose, too, so its carriers are shifted.
@@ -104,7 +104,11 @@ def impair(percepts: Sequence[Percept], truth: Truth) -> list[Percept]:
     list of Percept
     """
     kept = list(percepts)
-    for i, (east, north) in enumerate(truth.condition[:, [DRIFT_X, DRIFT_Y]].tolist()):
+    columns = [CAMERA, RADIO, ENERGY, DRIFT_X, DRIFT_Y]
+    for i, (camera, radio, energy, east, north) in enumerate(truth.condition[:, columns].tolist()):
+        health = Health(camera > 0.0, radio > 0.0, energy)
+        if health != kept[i].health:
+            kept[i] = replace(kept[i], health=health)
         if east or north:
             kept[i] = _shifted(kept[i], east, north)
     return kept

@@ -1,0 +1,146 @@
+"""What an agent knows of who holds what, and of targets that nobody holds, as it heard it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from staniel.datatypes.belief import TrackId
+from staniel.datatypes.message import Heartbeat, Point, Release, Unheld
+
+__all__ = ["Holding", "Lease", "Task", "UnheldTable"]
+
+TOLD = 8
+"""Unheld targets that a heartbeat tells of at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One of the agent's own tracks, as the auction sees it.
+
+    Attributes
+    ----------
+    id : TrackId
+    position : (float, float) [m]
+    course : float [rad]
+    cost : float [m]
+        What it costs the agent to watch it, and in `terms` what that is the sum of.
+    seen : bool
+        By the agent's own camera, just now.
+    terms : tuple of float [m]
+        As in `staniel.datatypes.message.Offer`.
+    velocity : (float, float) [m/s]
+    last_seen : float [s]
+        By anybody, as far as the agent heard.
+    """
+
+    id: TrackId
+    position: Point
+    course: float
+    cost: float
+    seen: bool
+    terms: tuple[float, ...] = ()
+    velocity: Point = (0.0, 0.0)
+    last_seen: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Holding:
+    """The target that the agent is responsible for, where and when it last was, since when."""
+
+    id: TrackId
+    position: Point
+    since: float
+    seen: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lease:
+    """What another agent holds, as of the message said at `said`."""
+
+    target: TrackId
+    cost: float
+    said: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    known: Unheld
+    since: float
+
+
+class UnheldTable:
+    """Targets that nobody holds, from own tracks and from what others say.
+
+    Parameters
+    ----------
+    memory : float [s]
+        A target that nobody has seen for so long is forgotten.
+    """
+
+    def __init__(self, memory: float) -> None:
+        self._memory = memory
+        self._entries: dict[TrackId, _Entry] = {}
+        self._gone: dict[TrackId, float] = {}
+
+    def __contains__(self, target: TrackId) -> bool:
+        return target in self._entries
+
+    def since(self, target: TrackId) -> float:
+        """When the agent first knew that nobody holds it [s]; it has to be in the table."""
+        return self._entries[target].since
+
+    def seen(self, target: TrackId, otherwise: float) -> float:
+        """When it was last seen [s], as far as the agent heard; `otherwise` where it did not."""
+        entry = self._entries.get(target)
+        return otherwise if entry is None else entry.known.seen
+
+    @property
+    def all(self) -> list[Unheld]:
+        """All of them, the longest unseen first."""
+        known = [entry.known for entry in self._entries.values()]
+        return sorted(known, key=lambda unheld: (unheld.seen, unheld.target))
+
+    @property
+    def told(self) -> tuple[Unheld, ...]:
+        """What a heartbeat says of them."""
+        return tuple(self.all[:TOLD])
+
+    def note(self, unheld: Unheld, time: float) -> None:
+        """Take in what is known at `time`; of two words the one of the newer sighting stands."""
+        target = unheld.target
+        if self.is_buried(unheld):
+            return
+        entry = self._entries.get(target)
+        if entry is None:
+            self._entries[target] = _Entry(unheld, time)
+        elif unheld.seen > entry.known.seen:
+            self._entries[target] = _Entry(unheld, entry.since)
+
+    def is_buried(self, unheld: Unheld) -> bool:
+        """Whether it was looked for in vain, or goes by another name, since it was seen."""
+        return unheld.seen <= self._gone.get(unheld.target, -1e300)
+
+    def hear(self, message: Heartbeat | Release, time: float) -> None:
+        """Take in what another agent says of unheld targets."""
+        if isinstance(message, Heartbeat):
+            for unheld in message.unheld:
+                self.note(unheld, time)
+        elif message.lost:
+            self.bury(message.target, message.time)
+        elif message.seen > -1e300:
+            self.note(Unheld(message.target, message.position, 0.0, message.seen), time)
+
+    def bury(self, target: TrackId, time: float) -> None:
+        """It is not where it was, or goes by another name: only a newer sighting counts."""
+        self._gone[target] = max(time, self._gone.get(target, time))
+        self.drop((target,))
+
+    def drop(self, targets: Iterable[TrackId]) -> None:
+        """Somebody holds these, or they go by another name."""
+        for target in targets:
+            self._entries.pop(target, None)
+
+    def forget(self, time: float) -> None:
+        """Drop what nobody has seen for too long by `time` [s]."""
+        oldest = time - self._memory
+        self._entries = {k: v for k, v in self._entries.items() if v.known.seen >= oldest}
+        self._gone = {k: v for k, v in self._gone.items() if v >= oldest}
