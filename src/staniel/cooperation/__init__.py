@@ -1,8 +1,18 @@
 """What the team agrees: who watches which target, and where to search."""
 
 from staniel.cooperation.allocation import Allocation, Holding, Task
+from staniel.cooperation.auction import Assignment, assign
 from staniel.cooperation.config import CooperationConfig
 from staniel.cooperation.helping import Helping
 from staniel.cooperation.search import SearchMap
 
-__all__ = ["Allocation", "CooperationConfig", "Helping", "Holding", "SearchMap", "Task"]
+__all__ = [
+    "Allocation",
+    "Assignment",
+    "CooperationConfig",
+    "Helping",
+    "Holding",
+    "SearchMap",
+    "Task",
+    "assign",
+]
