@@ -2,6 +2,7 @@
 
 from staniel.cooperation.allocation import Allocation
 from staniel.cooperation.assistance import Assistance
+from staniel.cooperation.auction import Assignment, assign
 from staniel.cooperation.config import CooperationConfig, CostConfig
 from staniel.cooperation.cost import CostModel, Goal, Price, Situation
 from staniel.cooperation.search import SearchMap
@@ -9,6 +10,7 @@ from staniel.cooperation.table import Holding, Task
 
 __all__ = [
     "Allocation",
+    "Assignment",
     "Assistance",
     "CooperationConfig",
     "CostConfig",
@@ -19,4 +21,5 @@ __all__ = [
     "SearchMap",
     "Situation",
     "Task",
+    "assign",
 ]
