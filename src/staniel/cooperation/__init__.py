@@ -2,7 +2,8 @@
 
 from staniel.cooperation.allocation import Allocation, Holding, Task
 from staniel.cooperation.config import CooperationConfig
+from staniel.cooperation.gate import Gate
 from staniel.cooperation.helping import Helping
 from staniel.cooperation.search import SearchMap
 
-__all__ = ["Allocation", "CooperationConfig", "Helping", "Holding", "SearchMap", "Task"]
+__all__ = ["Allocation", "CooperationConfig", "Gate", "Helping", "Holding", "SearchMap", "Task"]
