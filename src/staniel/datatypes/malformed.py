@@ -5,7 +5,7 @@ simulation, it is looked at once.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final, Literal, NamedTuple
 
 from staniel.datatypes.message import (
@@ -57,7 +57,7 @@ from staniel.datatypes.parts import (
 from staniel.datatypes.threats import Threats
 from staniel.datatypes.wire_sizes import LARGEST, wire_size
 
-__all__ = ["Fault", "fault_of"]
+__all__ = ["Fault", "fault_of", "faults_of"]
 
 
 class Fault(NamedTuple):
@@ -74,6 +74,7 @@ class Fault(NamedTuple):
     words: str
 
 
+# By identity, which stays theirs for as long as they are in here.
 _sound: dict[int, Message] = {}
 _REMEMBERED: Final = 4096
 
@@ -93,7 +94,7 @@ def fault_of(message: Message) -> Fault | None:
     Notes
     -----
     A message is immutable, so a sound one stays sound: up to 4096 of them are known again by
-    identity, in 0.1 µs.
+    identity, in a tenth of a microsecond.
 
     Examples
     --------
@@ -101,8 +102,17 @@ def fault_of(message: Message) -> Fault | None:
     >>> fault_of(AssistanceEnd(-3, 1, 5.0, target=TrackId(0.0, 1, 2))).words
     'sender = -3: expected a whole number from 0 to 65534'
     """
-    if _sound.get(id(message)) is message:
+    if id(message) in _sound:
         return None
+    return _examine(message)
+
+
+def faults_of(messages: Sequence[Message]) -> list[Fault | None]:
+    """What is wrong with each of many messages: as `fault_of`, faster."""
+    return [None if id(m) in _sound else _examine(m) for m in messages]
+
+
+def _examine(message: Message) -> Fault | None:
     try:
         words = _head(message) or _FAULTS[type(message)](message)
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
