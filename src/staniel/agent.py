@@ -18,6 +18,7 @@ from staniel.cooperation import (
     Assistance,
     CooperationConfig,
     CostModel,
+    Gate,
     Goal,
     Holding,
     SearchMap,
@@ -75,6 +76,10 @@ class Briefing:
     risk: tuple[RiskRegion, ...] = ()
     carried: CarriedThreat | None = None
     lidar: Lidar = Lidar()  # noqa: RUF009 - frozen
+    team: range | None = None
+    """Ids of all that may speak on the radio; None: anybody."""
+    patience: float = 60.0
+    """What was said longer ago is not heeded [s]."""
     centre: int | None = None
     """Id of the ground station that shares targets out, where one does."""
 
@@ -101,6 +106,9 @@ class Agent:
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
         airframe, clock = briefing.airframe, briefing.clock
         self.id, self._briefing = id, briefing
+        self._gate = Gate(
+            id, team=briefing.team, patience=briefing.patience, step=clock.decision_step
+        )
         self._picture = Picture(briefing.tracking, rng, id, briefing.chart)
         self._tracker = self._picture.tracker
         self._allocation = Allocation(
@@ -150,6 +158,7 @@ class Agent:
             To be broadcast; heard in the next step at the earliest.
         """
         time, pose = percept.time, percept.pose
+        inbox = self._gate.admit(time, inbox)
         warned = [message.threats for message in inbox if isinstance(message, Warn)]
         news = self.dangers.step(time, percept.threats, warned)
         tracks = self._track(percept, inbox)
@@ -182,6 +191,11 @@ class Agent:
         target = None if held is None else held.id
         self.belief = Belief(self._tracker.estimates, role, target, goal, guard)
         return command, outbox
+
+    @property
+    def dropped(self) -> dict[str, int]:
+        """How many messages it did not heed, by reason: see `staniel.cooperation.gate`."""
+        return dict(self._gate.dropped)
 
     def _avoid(
         self, percept: Percept, inbox: Sequence[Message], command: Command

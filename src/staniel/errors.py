@@ -12,6 +12,7 @@ __all__ = [
     "ScenarioError",
     "StanielError",
     "StudyError",
+    "WireError",
 ]
 
 
@@ -41,3 +42,22 @@ class PlanningError(StanielError):
 
 class StudyError(StanielError):
     """A study cannot be run as asked, or what it left cannot be read."""
+
+
+class WireError(StanielError):
+    """A packet is no message, or a message cannot become a packet.
+
+    Parameters
+    ----------
+    message : str
+    reason : {"malformed", "oversized", "forged"}, optional
+
+    Attributes
+    ----------
+    reason : str
+        By which it is counted.
+    """
+
+    def __init__(self, message: str, reason: str = "malformed") -> None:
+        super().__init__(message)
+        self.reason = reason

@@ -123,23 +123,26 @@ def test_sizes_on_the_air():
     pose, name = Pose(0, 0, 0, 0, 0, 0), TrackId(0.0, 0, 1)
     sighting = Sighting(0.0, [0.0, 0.0], np.eye(2))
     assert wire_size(Message(0, 1, 0.0)) == HEAD == 16
-    assert wire_size(Report(0, 1, 0.0, sightings=(sighting,) * 3)) == 16 + 3 * 54
+    assert wire_size(Report(0, 1, 0.0, sightings=(sighting,) * 3)) == 19 + 3 * 31
+    posed = replace(sighting, pose=pose, pose_deviation=2.0)
+    assert wire_size(Report(0, 1, 0.0, sightings=(posed,), names=(name,))) == 19 + 31 + 28 + 14
     heartbeat = Heartbeat(
         0, 1, 0.0, pose=pose, role="search", goal=(0, 0), target=None, target_position=None, cost=0
     )
-    assert wire_size(heartbeat) == 75
+    assert wire_size(heartbeat) == 55
+    assert wire_size(replace(heartbeat, target=name, target_position=(0, 0))) == 55 + 14 + 8
     banks = FlyBanks((0.1, 0.2), 1.0, 15.0, 80.0)
-    assert wire_size(replace(heartbeat, command=banks)) == 75 + 13 + 1 + 2 * 2
+    assert wire_size(replace(heartbeat, command=banks)) == 55 + 13 + 1 + 2 * 2
     led = replace(banks, look=(3.0, 4.0))
-    assert wire_size(replace(heartbeat, command=led)) == 75 + 13 + 1 + 2 * 2 + 8
-    assert wire_size(Bid(0, 1, 0.0, targets=(name,), auctioneers=(1,), costs=(1.0,))) == 36
-    assert wire_size(Award(0, 1, 0.0, target=name, position=(0, 0), winner=1, cost=1.0)) == 44
-    assert wire_size(Release(0, 1, 0.0, target=name, position=(0, 0), lost=True)) == 39
+    assert wire_size(replace(heartbeat, command=led)) == 55 + 13 + 1 + 2 * 2 + 8
+    assert wire_size(Bid(0, 1, 0.0, targets=(name,), auctioneers=(1,), costs=(1.0,))) == 19 + 20
+    assert wire_size(Award(0, 1, 0.0, target=name, position=(0, 0), winner=1, cost=1.0)) == 46
+    assert wire_size(Release(0, 1, 0.0, target=name, position=(0, 0), lost=True)) == 47
     disc = RiskRegion(kind="threat", center=(0.0, 0.0), radius=9.0, rate=1.0)
     ban = RiskRegion(kind="no-fly", polygon=((0, 0), (9, 0), (9, 9), (0, 9)))
     carrier = Carrier(0.0, [0.0, 0.0], np.eye(2), 60.0, 0.5)
     warning = Warn(0, 1, 0.0, threats=Threats((disc, ban), (carrier,) * 2))
-    assert wire_size(warning) == 16 + (15 + 12) + (15 + 4 * 8) + 2 * 38
+    assert wire_size(warning) == 20 + (9 + 8 + 24) + (9 + 2 + 16 * 4) + 2 * 38
 
 
 def test_bandwidth_sends_one_after_the_other():

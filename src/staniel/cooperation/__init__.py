@@ -5,6 +5,7 @@ from staniel.cooperation.assistance import Assistance
 from staniel.cooperation.auction import Assignment, assign
 from staniel.cooperation.config import CooperationConfig, CostConfig
 from staniel.cooperation.cost import CostModel, Goal, Price, Situation
+from staniel.cooperation.gate import Gate
 from staniel.cooperation.search import SearchMap
 from staniel.cooperation.table import Holding, Task
 
@@ -15,6 +16,7 @@ __all__ = [
     "CooperationConfig",
     "CostConfig",
     "CostModel",
+    "Gate",
     "Goal",
     "Holding",
     "Price",

@@ -1,4 +1,4 @@
-"""Explicit cooperation: a holder asks, free agents offer, the holder takes the best (thesis 7.2.1.1).
+"""Explicit cooperation: a holder asks, free agents offer, it takes the best (thesis 7.2.1.1).
 
 request → offer → the holder's heartbeat names its helpers, which is a lease like an award: it ends
 when a heartbeat says otherwise, by an end from either side, or by silence.

@@ -46,15 +46,16 @@ class Custody:
         pairs = np.triu(np.ones(self.reach.shape[1:], dtype=np.bool_), 1)
         held = self.held.astype(np.float32)
         together = np.einsum("nab,nav,nbv->nv", (self.reach & pairs).astype(np.float32), held, held)
-        return np.asarray(together > 0.0)
+        doubled: Bools = np.asarray(together) > 0.0
+        return doubled
 
     @property
     def orphaned(self) -> Bools:
         """(n, v): one knows it, nobody holds it, and a free one can hear him or is himself."""
         reach = self.reach | np.eye(self.reach.shape[1], dtype=np.bool_)
-        free = (reach & self.free[:, None, :]).any(axis=2)
-        wanted = (self.known & free[:, :, None]).any(axis=1)
-        return np.asarray(wanted & ~self.held.any(axis=1))
+        free: Bools = (reach & self.free[:, None, :]).any(axis=2)
+        wanted: Bools = (self.known & free[:, :, None]).any(axis=1)
+        return wanted & ~self.held.any(axis=1)
 
 
 def custody(record: Record) -> Custody:
@@ -102,7 +103,8 @@ def _reach(record: Record, talking: Bools) -> Bools:
     radio = record.scenario.get("radio", {})
     places = record.aircraft[:, :, :3]
     ways = np.linalg.norm(places[:, :, None] - places[:, None], axis=3)
-    reach = talking[:, :, None] & talking[:, None, :] & (ways <= float(radio.get("range", np.inf)))
+    near = ways <= float(radio.get("range", np.inf))
+    reach: Bools = talking[:, :, None] & talking[:, None, :] & near
     count = places.shape[1]
     for partition in radio.get("partitions", ()):
         group = np.full(count, -1)

@@ -17,6 +17,7 @@ from staniel.world import Lidars, MixedCameras, Radio, ThreatSensors, World
 __all__ = ["assemble", "kernels_of"]
 
 _ROUNDING = 1e-9  # of a tick
+_STALE = 60.0  # beyond what the radio delays, a message is too old to be heeded [s]
 _MAST = 10.0  # height of a ground station's antenna [m]
 
 
@@ -66,6 +67,8 @@ def assemble(scenario: Scenario, city: City) -> Mission:
         risk=scenario.risk.briefed,
         carried=scenario.risk.carried.briefing,
         lidar=scenario.lidar,
+        team=range(team.count + 1),
+        patience=_STALE + scenario.radio.latency + 5.0 * scenario.radio.jitter,
         centre=team.count if scenario.cooperation.mode == "centralised" else None,
     )
     world = World(
