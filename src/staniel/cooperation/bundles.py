@@ -147,7 +147,8 @@ class Bundles:
         """Settle what the sender thinks; returns whether it should hear from this agent."""
         theirs = {claim.target: claim for claim in message.claims}
         word = {**dict(message.heard), message.sender: message.time}
-        for target in theirs.keys() | self._claims.keys():
+        disputed = theirs.keys() | self._claims.keys() if theirs != self._claims else ()
+        for target in disputed:
             claim, own = theirs.get(target), self._claims.get(target)
             if claim == own:
                 continue
@@ -158,8 +159,8 @@ class Bundles:
                 self._claims[target] = settled
         self._newest[message.sender] = message.sequence
         for agent, time in word.items():
-            if agent != self.agent:
-                self._heard[agent] = max(time, self._heard.get(agent, _NEVER))
+            if agent != self.agent and time > self._heard.get(agent, _NEVER):
+                self._heard[agent] = time
         return theirs != self._claims
 
     def _settle(
