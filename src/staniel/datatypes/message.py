@@ -271,7 +271,7 @@ class AssistanceEnd(Message):
 
 
 class Claim(NamedTuple):
-    """Who wins a target in a consensus on bundles, at what bid, by whose word of when."""
+    """Who wins a target in a consensus on bundles, and at what bid."""
 
     target: TrackId
     winner: int
