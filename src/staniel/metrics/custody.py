@@ -46,16 +46,17 @@ class Custody:
         pairs = np.triu(np.ones(self.reach.shape[1:], dtype=np.bool_), 1)
         held = self.held.astype(np.float32)
         together = np.einsum("nab,nav,nbv->nv", (self.reach & pairs).astype(np.float32), held, held)
-        doubled: Bools = np.asarray(together) > 0.0
+        doubled: Bools = np.greater(together, 0.0)
         return doubled
 
     @property
     def orphaned(self) -> Bools:
         """(n, v): one knows it, nobody holds it, and a free one can hear him or is himself."""
         reach = self.reach | np.eye(self.reach.shape[1], dtype=np.bool_)
-        free: Bools = (reach & self.free[:, None, :]).any(axis=2)
-        wanted: Bools = (self.known & free[:, :, None]).any(axis=1)
-        return wanted & ~self.held.any(axis=1)
+        free = np.any(reach & self.free[:, None, :], axis=2)
+        wanted = np.any(self.known & free[:, :, None], axis=1)
+        orphaned: Bools = wanted & ~self.held.any(axis=1)
+        return orphaned
 
 
 def custody(record: Record) -> Custody:
