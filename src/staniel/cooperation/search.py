@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.city import City
+from staniel.city import City, street_cells
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import Point
@@ -43,7 +43,7 @@ class SearchMap:
 
     def __init__(self, chart: City, airframe: Airframe, camera: Camera, *, cell: float) -> None:
         self._chart, self._airframe, self._camera, self._cell = chart, airframe, camera, cell
-        self._places = _street_places(chart, cell, camera.target_height)
+        self._places = street_cells(chart, cell, camera.target_height)
         self._looked = np.full(self._places.shape[:2], NEVER)
         self._goal: tuple[int, int] | None = None
         self._chosen_at = -math.inf
@@ -117,24 +117,3 @@ class SearchMap:
         if index is None or index[0] < 0:
             return self._chart.size[0] / 2.0, self._chart.size[1] / 2.0
         return float(self._places[index][0]), float(self._places[index][1])
-
-
-def _street_places(chart: City, cell: float, height: float) -> NDArray[np.float64]:
-    """One point a cell: of nine, the free one nearest to the cell's middle; NaN if none is free."""
-    columns, rows = (math.ceil(side / cell) for side in chart.size)
-    steps = np.array([0.5, 1.0 / 6.0, 5.0 / 6.0])
-    x = np.arange(columns)[None, :]
-    y = np.arange(rows)[:, None]
-    places = np.full((rows, columns, 3), np.nan)
-    places[:, :, 2] = height
-    candidates = sorted(
-        ((a, b) for a in steps for b in steps), key=lambda p: abs(p[0] - 0.5) + abs(p[1] - 0.5)
-    )
-    for a, b in candidates:
-        px = np.minimum((x + a) * cell + 0.0 * y, chart.size[0])
-        py = np.minimum((y + b) * cell + 0.0 * x, chart.size[1])
-        free = ~chart.inside(np.stack([px, py], axis=-1).reshape(-1, 2)).reshape(rows, columns)
-        take = free & np.isnan(places[:, :, 0])
-        places[:, :, 0][take] = px[take]
-        places[:, :, 1][take] = py[take]
-    return places
