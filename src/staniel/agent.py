@@ -18,8 +18,9 @@ from staniel.datatypes.belief import Belief, Percept, Pose, Sighting, TrackEstim
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyBanks, FlyLine, look_point
 from staniel.datatypes.equipment import Airframe, Camera, Lidar
-from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
+from staniel.datatypes.message import Heartbeat, Looked, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
+from staniel.errors import StanielError
 from staniel.guidance import (
     GuidanceConfig,
     KnownDangers,
@@ -75,6 +76,8 @@ class Agent:
         What it holds true and does, as of the last step.
     dangers : KnownDangers
         What it was told and noticed of threats and no-fly regions.
+    refused : int
+        Words on what was looked at that were none, and were dropped.
     """
 
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
@@ -90,8 +93,14 @@ class Agent:
         )
         self._helping = Helping(id, briefing.cooperation)
         self._search = SearchMap(
-            briefing.chart, airframe, briefing.camera, cell=briefing.cooperation.search_cell
+            briefing.chart,
+            airframe,
+            briefing.camera,
+            cell=briefing.cooperation.search_cell,
+            areas=briefing.cooperation.areas,
         )
+        self._shared_at = -math.inf
+        self.refused = 0
         self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
         self._lookahead = briefing.guidance.prediction_steps * clock.decision_step
         self.dangers = KnownDangers(
@@ -143,6 +152,7 @@ class Agent:
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
+        outbox.extend(self._share(time))
         # Partners and those who avoid one another want to know what is flown.
         planned = role in ("pursue", "help") and isinstance(command, FlyBanks)
         told = command if planned or self._avoidance is not None else None
@@ -239,12 +249,7 @@ class Agent:
         self, time: float, pose: Pose, inbox: Sequence[Message], outbox: list[Message]
     ) -> tuple[Command, str, Point]:
         """Pursue the held target; else loiter where one was lost; else search."""
-        heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
-        self._search.look(
-            time,
-            [pose, *(message.pose for message in heartbeats)],
-            [self.belief.goal, *(message.goal for message in heartbeats)],
-        )
+        self._look_around(time, pose, inbox)
         held, guidance = self._allocation.holding, self._briefing.guidance
         if held is not None:
             track = self._track_named(held.id)
@@ -266,10 +271,35 @@ class Agent:
                 command = loiter(pose, place, self._briefing.airframe, guidance)
                 return command, "recover", place
             self._last_place = None
-        others = [message.goal for message in heartbeats if message.role == "search"]
-        start, goal = self._search.leg(time, pose, others)
+        start, goal = self._search.leg(time, pose, self._lost_clouds)
         airframe = self._briefing.airframe
         return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
+
+    def _look_around(self, time: float, pose: Pose, inbox: Sequence[Message]) -> None:
+        """Note on the search map what was looked at, by this aircraft and as the others say."""
+        self._search.look(time, pose, self._look)
+        self._search.hear(message for message in inbox if isinstance(message, Heartbeat))
+        for message in inbox:
+            if isinstance(message, Looked):
+                try:
+                    self._search.take(message.cells, time)
+                except StanielError:
+                    self.refused += 1
+
+    def _share(self, time: float) -> list[Message]:
+        """What was looked at, for the others, every `share_every` seconds."""
+        every = self._briefing.cooperation.share_every
+        if every == 0.0 or time - self._shared_at < every:
+            return []
+        self._shared_at = time
+        cells = self._search.pack(time)
+        return [Looked(self.id, self._allocation.next_sequence(), time, cells=cells)]
+
+    def _lost_clouds(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Where the lost targets may be that nobody is known to hold."""
+        held = self._allocation.held
+        lost = self._tracker.lost_particles()
+        return [cloud for name, cloud in lost.items() if name not in held]
 
     def _help(self, time: float, pose: Pose, target: TrackId) -> tuple[Command, str, Point]:
         """Pursue what another holds; circle where it is said to be until an own track says it."""
