@@ -24,13 +24,15 @@ from staniel.cooperation import (
     SearchMap,
     Situation,
     Task,
+    priority_at,
 )
 from staniel.datatypes.belief import Belief, Percept, Pose, TrackEstimate, TrackId
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyBanks, FlyLine, look_point
 from staniel.datatypes.equipment import Airframe, Camera, Lidar
-from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
+from staniel.datatypes.message import Heartbeat, Looked, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
+from staniel.errors import StanielError
 from staniel.guidance import (
     GuidanceConfig,
     KnownDangers,
@@ -101,6 +103,8 @@ class Agent:
         What it holds true and does, as of the last step.
     dangers : KnownDangers
         What it was told and noticed of threats and no-fly regions.
+    refused : int
+        Words on what was looked at that were none, and were dropped.
     """
 
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
@@ -118,14 +122,21 @@ class Agent:
             centre=briefing.centre,
         )
         self._assistance = Assistance(id, briefing.cooperation, step=clock.decision_step)
+        areas = briefing.cooperation.areas
         self._costs = CostModel(
-            briefing.cooperation.cost, airframe, briefing.camera, briefing.chart
+            briefing.cooperation.cost, airframe, briefing.camera, briefing.chart, areas
         )
         self._visibility = 1.0
         self._arrived: float | None = None
         self._search = SearchMap(
-            briefing.chart, airframe, briefing.camera, cell=briefing.cooperation.search_cell
+            briefing.chart,
+            airframe,
+            briefing.camera,
+            cell=briefing.cooperation.search_cell,
+            areas=areas,
         )
+        self._shared_at = -math.inf
+        self._refused = 0
         self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
         self._lookahead = briefing.guidance.prediction_steps * clock.decision_step
         self.dangers = KnownDangers(
@@ -179,6 +190,7 @@ class Agent:
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
+        outbox.extend(self._share(time))
         # Partners and those who avoid one another want to know what is flown.
         planned = role in ("pursue", "help") and isinstance(command, FlyBanks)
         told = command if planned or self._avoidance is not None else None
@@ -195,7 +207,9 @@ class Agent:
     @property
     def dropped(self) -> dict[str, int]:
         """How many messages it did not heed, by reason: see `staniel.cooperation.gate`."""
-        return dict(self._gate.dropped)
+        counts = dict(self._gate.dropped)
+        counts["malformed"] += self._refused
+        return counts
 
     def _avoid(
         self, percept: Percept, inbox: Sequence[Message], command: Command
@@ -269,6 +283,9 @@ class Agent:
         config = self._briefing.cooperation
         if config.assistance == "always":
             return "value"
+        held = self._allocation.holding
+        if held is not None and priority_at(config.areas, held.position) > 1.0:
+            return "value"
         if self.belief.guard:
             return "avoidance"
         return "visibility" if self._visibility < config.ask_below else None
@@ -327,12 +344,7 @@ class Agent:
     ) -> tuple[Command, str, Point]:
         """Pursue the held target; else help; else loiter where one was lost; else search."""
         time, pose = percept.time, percept.pose
-        heartbeats = [message for message in inbox if isinstance(message, Heartbeat)]
-        self._search.look(
-            time,
-            [pose, *(message.pose for message in heartbeats)],
-            [self.belief.goal, *(message.goal for message in heartbeats)],
-        )
+        self._look_around(time, pose, inbox)
         held = self._allocation.holding
         if held is not None:
             track = self._track_named(held.id)
@@ -353,8 +365,7 @@ class Agent:
         if not percept.health.camera:
             place = (pose.x, pose.y) if self.belief.role != "standby" else self.belief.goal
             return self._circle(pose, place), "standby", place
-        others = [message.goal for message in heartbeats if message.role == "search"]
-        start, goal = self._search.leg(time, pose, others)
+        start, goal = self._search.leg(time, pose, self._lost_clouds)
         airframe = self._briefing.airframe
         return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
 
@@ -378,6 +389,32 @@ class Agent:
 
     def _circle(self, pose: Pose, place: Point) -> Command:
         return loiter(pose, place, self._briefing.airframe, self._briefing.guidance)
+
+    def _look_around(self, time: float, pose: Pose, inbox: Sequence[Message]) -> None:
+        """Note on the search map what was looked at, by this aircraft and as the others say."""
+        self._search.look(time, pose, self._look)
+        self._search.hear(message for message in inbox if isinstance(message, Heartbeat))
+        for message in inbox:
+            if isinstance(message, Looked):
+                try:
+                    self._search.take(message.cells, time)
+                except StanielError:
+                    self._refused += 1
+
+    def _share(self, time: float) -> list[Message]:
+        """What was looked at, for the others, every `share_every` seconds."""
+        every = self._briefing.cooperation.share_every
+        if every == 0.0 or time - self._shared_at < every:
+            return []
+        self._shared_at = time
+        cells = self._search.pack(time)
+        return [Looked(self.id, self._allocation.next_sequence(), time, cells=cells)]
+
+    def _lost_clouds(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Where the lost targets may be that nobody is known to hold."""
+        held = self._allocation.held
+        lost = self._tracker.lost_particles()
+        return [cloud for name, cloud in lost.items() if name not in held]
 
     def _help(self, time: float, pose: Pose, target: TrackId) -> tuple[Command, str, Point]:
         """Plan with the holder where the policy can; else circle midway to it (thesis 7.2.1.1)."""

@@ -1,5 +1,6 @@
 """The map: buildings with heights, what they hide, and where they come from."""
 
+from staniel.city.cells import street_cells
 from staniel.city.city import City
 from staniel.city.coverage import Footprint, footprint
 from staniel.city.geojson import CityWarning
@@ -14,6 +15,7 @@ __all__ = [
     "RoadNetwork",
     "footprint",
     "load_city",
+    "street_cells",
     "visible_ground",
     "visible_share",
 ]

@@ -3,7 +3,7 @@
 from staniel.cooperation.allocation import Allocation
 from staniel.cooperation.assistance import Assistance
 from staniel.cooperation.auction import Assignment, assign
-from staniel.cooperation.config import CooperationConfig, CostConfig
+from staniel.cooperation.config import Area, CooperationConfig, CostConfig, priority_at
 from staniel.cooperation.cost import CostModel, Goal, Price, Situation
 from staniel.cooperation.gate import Gate
 from staniel.cooperation.search import SearchMap
@@ -11,6 +11,7 @@ from staniel.cooperation.table import Holding, Task
 
 __all__ = [
     "Allocation",
+    "Area",
     "Assignment",
     "Assistance",
     "CooperationConfig",
@@ -24,4 +25,5 @@ __all__ = [
     "Situation",
     "Task",
     "assign",
+    "priority_at",
 ]

@@ -24,6 +24,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from staniel.cooperation.awarding import best_for_all, lowest, offers_of
 from staniel.cooperation.config import CooperationConfig
 from staniel.cooperation.cost import Goal, Price
@@ -272,8 +274,8 @@ class Allocation:
             return
         self._told[sender] = message.sequence
         self._beats[sender] = message
-        self._unheld.hear(message, self._time)
-        self._correct(message)
+        if message.unheld:
+            self._correct(self._unheld.hear(message.unheld, self._time))
         if target is None or position is None:
             lease = self._leases.get(sender)
             # Who says nothing of an award after it was made did not hear it.
@@ -291,10 +293,10 @@ class Allocation:
             self.holding = None
         self._rename(own, target)
 
-    def _correct(self, message: Heartbeat) -> None:
+    def _correct(self, wrong: list[Unheld]) -> None:
         """Tell who still counts a target as unheld that was looked for, or is known otherwise."""
-        for unheld in message.unheld:
-            if self._unheld.is_buried(unheld) and unheld.target not in self._paused:
+        for unheld in wrong:
+            if unheld.target not in self._paused:
                 self._paused[unheld.target] = self._time + 2.0 * self._bid_time
                 self._say(
                     Release,
@@ -345,7 +347,7 @@ class Allocation:
         # A heartbeat that was said later may have come before it.
         if lease is not None and lease.target == target and lease.said <= message.time:
             del self._leases[sender]
-        self._unheld.hear(message, self._time)
+        self._unheld.hear_release(message, self._time)
         auction = self._auctions.get(target)
         if auction is not None and auction.award is not None and auction.award.winner == sender:
             # It was awarded something better: to the next.
@@ -378,12 +380,8 @@ class Allocation:
         """Answer the auctions of others: revoke, consent, or bid."""
         announced.sort(key=lambda message: (message.target, message.sender))
         wanted: list[Announce] = []
-        for message in announced:
-            # Of two names for one target the older goes on.
-            if not any(
-                math.dist(message.position, other.position) <= self._config.same_target
-                for other in wanted
-            ) and self._is_for_bids(message):
+        for message in _first_names(announced, self._config.same_target):
+            if self._is_for_bids(message):
                 wanted.append(message)
                 self._elsewhere[message.target] = message, self._time + self._bid_time
         if not wanted or not self._free or self._unfit:
@@ -728,6 +726,16 @@ class Allocation:
     def _say(self, kind: type[Message], **content: Any) -> None:  # noqa: ANN401 - what the kind holds
         self._sequence += 1
         self._out.append(kind(self._agent, self._sequence, self._time, **content))
+
+
+def _first_names(announced: list[Announce], near: float) -> list[Announce]:
+    """Without those at whose place another one is announced under an older name."""
+    if len(announced) < 2:
+        return announced
+    places = np.array([message.position for message in announced])
+    apart = places[:, None, :] - places
+    again = np.tril((apart * apart).sum(axis=2) <= near * near, -1).any(axis=1).tolist()
+    return [message for message, twice in zip(announced, again, strict=True) if not twice]
 
 
 def _goal(task: Task) -> Goal:

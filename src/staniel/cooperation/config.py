@@ -1,15 +1,47 @@
 """How the team shares its targets out and where it searches."""
 
+import math
+from collections.abc import Iterable
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from staniel.datatypes.config import Config
 
-__all__ = ["CooperationConfig", "CostConfig"]
+__all__ = ["Area", "CooperationConfig", "CostConfig", "priority_at"]
+
+Coordinate = Annotated[float, Field(ge=-1e5, le=1e5)]
 
 
-Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+class Area(Config):
+    """A disc that the operator cares about more, or less, than about the rest of the city."""
+
+    center: tuple[Coordinate, Coordinate] = Field(description="east, north [m]")
+    radius: float = Field(gt=0.0, le=1e5, description="of the disc [m]")
+    priority: float = Field(
+        2.0, gt=0.0, le=100.0, description="how much more than elsewhere it matters, a factor"
+    )
+
+
+def priority_at(areas: Iterable[Area], position: tuple[float, float]) -> float:
+    """How much a place matters: the highest priority of the areas that it lies in, 1 outside.
+
+    Parameters
+    ----------
+    areas : iterable of Area
+    position : (float, float) [m]
+
+    Examples
+    --------
+    >>> priority_at([Area(center=(100.0, 100.0), radius=50.0, priority=3.0)], (100.0, 150.0))
+    3.0
+    """
+    return max(
+        (area.priority for area in areas if math.dist(area.center, position) <= area.radius),
+        default=1.0,
+    )
+
+
 Weight = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
@@ -21,7 +53,7 @@ class CostConfig(Config):
     visibility: Weight = Field(0.0, description="of a target hidden from all around [m]")
     sensor: Weight = Field(0.0, description="of a camera that detects nothing [m]")
     speed: Weight = Field(0.0, description="of a target as fast as the aircraft can fly [m]")
-    priority: Weight = Field(0.0, description="less, for a target of priority 1 [m]")
+    priority: Weight = Field(0.0, description="less, for each unit of priority above 1 [m]")
 
 
 class CooperationConfig(Config):
@@ -76,4 +108,10 @@ class CooperationConfig(Config):
         None, description="of the centralised mode; not set: the city's south-west corner [m]"
     )
     search_cell: float = Field(20.0, gt=0.0, description="cell of the search map [m]")
+    share_every: float = Field(
+        5.0, ge=0.0, le=3600.0, description="between two words on what was looked at; 0: none [s]"
+    )
+    areas: tuple[Area, ...] = Field(
+        (), max_length=100, description="that matter more, or less, than the rest"
+    )
     cost: CostConfig = CostConfig()

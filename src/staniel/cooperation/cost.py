@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
-from staniel.cooperation.config import CostConfig
+from staniel.cooperation.config import Area, CostConfig, priority_at
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import COST_TERMS, Point
@@ -77,8 +77,8 @@ class CostModel:
     airframe, camera : Airframe, Camera
     chart : City
         What hides goals, as far as the agent knows.
-    priority : callable, optional
-        Priority of a place, for the term of that name.
+    areas : sequence of Area, optional
+        Where targets matter more, or less, for the term ``priority``.
     """
 
     def __init__(
@@ -87,10 +87,10 @@ class CostModel:
         airframe: Airframe,
         camera: Camera,
         chart: City,
-        priority: Callable[[Point], float] | None = None,
+        areas: Sequence[Area] = (),
     ) -> None:
         self._config, self._airframe, self._camera = config, airframe, camera
-        self._chart, self._priority = chart, priority
+        self._chart, self._areas = chart, areas
         weights = (config.energy, config.exposure, config.visibility, config.sensor, config.speed)
         self._plain = not any(weights) and not config.priority
 
@@ -132,8 +132,8 @@ class CostModel:
         if weights.sensor:
             terms["sensor"] = weights.sensor * (1.0 - self._capability(situation))
         terms["speed"] = weights.speed * goal.speed / self._airframe.max_speed
-        if self._priority is not None:
-            terms["priority"] = -weights.priority * self._priority(goal.position)
+        if weights.priority:
+            terms["priority"] = weights.priority * (1.0 - priority_at(self._areas, goal.position))
         return Price(math.fsum(terms.values()), tuple(terms.values()))
 
     def _exposure(self, situation: Situation, goal: Goal) -> float:

@@ -1,10 +1,11 @@
 """What an agent knows of who holds what, and of targets that nobody holds, as it heard it."""
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from staniel.datatypes.belief import TrackId
-from staniel.datatypes.message import Heartbeat, Point, Release, Unheld
+from staniel.datatypes.message import Point, Release, Unheld
 
 __all__ = ["Holding", "Lease", "Task", "UnheldTable"]
 
@@ -117,16 +118,26 @@ class UnheldTable:
 
     def is_buried(self, unheld: Unheld) -> bool:
         """Whether it was looked for in vain, or goes by another name, since it was seen."""
-        return unheld.seen <= self._gone.get(unheld.target, -1e300)
+        return unheld.seen <= self._gone.get(unheld.target, -math.inf)
 
-    def hear(self, message: Heartbeat | Release, time: float) -> None:
-        """Take in what another agent says of unheld targets."""
-        if isinstance(message, Heartbeat):
-            for unheld in message.unheld:
+    def hear(self, told: Iterable[Unheld], time: float) -> list[Unheld]:
+        """Take in what another agent says nobody holds; those that are buried come back."""
+        wrong, entries = [], self._entries
+        for unheld in told:
+            entry = entries.get(unheld.target)
+            if entry is not None and entry.known.seen >= unheld.seen:
+                continue
+            if self.is_buried(unheld):
+                wrong.append(unheld)
+            else:
                 self.note(unheld, time)
-        elif message.lost:
+        return wrong
+
+    def hear_release(self, message: Release, time: float) -> None:
+        """Another agent let go of a target: it is unheld, or not where it was."""
+        if message.lost:
             self.bury(message.target, message.time)
-        elif message.seen > -1e300:
+        elif math.isfinite(message.seen):
             self.note(Unheld(message.target, message.position, 0.0, message.seen), time)
 
     def bury(self, target: TrackId, time: float) -> None:

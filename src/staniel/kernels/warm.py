@@ -26,6 +26,7 @@ ALWAYS = (
     "search",
     "visibility",
     "unseen",
+    "revisit",
 )
 """What every mission calls. Others are named by the scenario that uses them."""
 

@@ -7,6 +7,7 @@ from staniel.metrics.dangers import danger_metrics, noticed_metrics
 from staniel.metrics.flown import aircraft_metrics
 from staniel.metrics.following import follow
 from staniel.metrics.links import sender_metrics
+from staniel.metrics.revisit import revisit_metrics
 from staniel.metrics.targets import target_metrics
 from staniel.metrics.team import team_metrics
 from staniel.metrics.unseen import unwatched_metrics
@@ -59,6 +60,7 @@ def compute_metrics(record: Record) -> dict[str, Any]:
             **team_metrics(record, following, targets),
             **team_causes,
             **custody_metrics(record),
+            **revisit_metrics(record),
             "risk_noticed": noticed_metrics(record),
         },
     }

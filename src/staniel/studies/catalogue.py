@@ -91,6 +91,10 @@ _TEAM: Final = {
     "messages_delivered": Metric("messages delivered"),
     "messages_possible": Metric("messages possible"),
     "messages_dropped": Metric("messages dropped", "", "lower"),
+    "revisit_mean": Metric("mean time to a street's next look", "s", "lower"),
+    "revisit_longest": Metric("longest time that a street waited", "s", "lower"),
+    "age_mean": Metric("mean time since a street was seen", "s", "lower"),
+    "never_seen_share": Metric("streets never seen", "%", "lower"),
 }
 _AIRCRAFT: Final = {
     "distance": Metric("flown together", "m"),

@@ -111,13 +111,34 @@ class Memory:
         self.forget({id for id in claimed if id is not None})
         return claimed
 
+    def clouds(self, now: float) -> dict[TrackId, tuple[Floats, Floats]]:
+        """Where each lost target may be, at most a stride before `now`: places and weights.
+
+        Only whole strides are predicted, the same ones as if nobody asked.
+        """
+        self._predict(now)
+        bank, oldest = self._bank, now - self._config.remember
+        return {
+            id: (bank.places(k, self._time, self._time), bank.weights[k].astype(np.float64))
+            for k, (id, lost) in enumerate(zip(self._ids, self._lost, strict=True))
+            if lost >= oldest
+        }
+
     def _advance(self, now: float) -> None:
-        while self._ids and self._time < now:
-            after = min(self._time + _STRIDE, now)
-            self._bank.predict(self._time, after)
-            self._bank.settle()
-            self._time = after
+        self._predict(now)
+        if self._ids and self._time < now:
+            self._step(now)
         self._time = now
+
+    def _predict(self, now: float) -> None:
+        """Whole strides, as many as have passed by `now`."""
+        while self._ids and self._time + _STRIDE <= now:
+            self._step(self._time + _STRIDE)
+
+    def _step(self, after: float) -> None:
+        self._bank.predict(self._time, after)
+        self._bank.settle()
+        self._time = after
 
     def _keep(self, kept: list[int]) -> None:
         self._bank.keep(kept)

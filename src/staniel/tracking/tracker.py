@@ -233,6 +233,19 @@ class Tracker:
         weights: Floats = self._bank.weights[self._index(track)].astype(np.float64)
         return weights
 
+    def lost_particles(self) -> dict[TrackId, tuple[Floats, Floats]]:
+        """Where each lost target may be by now, as far as it is remembered.
+
+        Asking changes nothing: the tracker goes on as if nobody had asked.
+
+        Returns
+        -------
+        dict
+            By name, the longest lost first: places, (n, 2) float64 array [m], and their normalised
+            weights, (n,) float64 array. At most 50 targets.
+        """
+        return {} if self._time is None else self._memory.clouds(self._time)
+
     def owner_of(self, sighting: Sighting) -> TrackId | None:
         """Name of the track that a sighting handed in with the last step went to, if any."""
         time, x, y, _, _, _, reporter = sighting.row
