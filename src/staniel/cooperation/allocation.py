@@ -30,6 +30,7 @@ from staniel.cooperation.awarding import best_for_all, lowest, offers_of
 from staniel.cooperation.config import CooperationConfig
 from staniel.cooperation.cost import Goal, Price
 from staniel.cooperation.table import Holding, Lease, Task, UnheldTable
+from staniel.cooperation.trails import Trails
 from staniel.datatypes.belief import Pose, TrackId
 from staniel.datatypes.command import Command
 from staniel.datatypes.message import (
@@ -105,6 +106,7 @@ class Allocation:
         self._bids: list[tuple[float, Bid]] = []
         self._paused: dict[TrackId, float] = {}
         self._unheld = UnheldTable(config.unheld_memory)
+        self._trails = Trails(config.unheld_memory, config.same_target)
         self._told: dict[int, int] = {}
         self._beats: dict[int, Heartbeat] = {}
         self._said: dict[float, float] = {}
@@ -676,6 +678,12 @@ class Allocation:
                     Unheld(task.id, task.position, task.course, task.last_seen), self._time
                 )
         self._unheld.drop(taken - set(self._auctions))
+        # What goes by another name by now is not without a holder, or is told under that name.
+        self._trails.note(self._time, self._tasks.values())
+        speeds = {task.id: math.hypot(*task.velocity) for task in self._tasks.values()}
+        for unheld in self._unheld.all:
+            if unheld.target not in self._tasks and self._trails.explains(unheld, speeds):
+                self._unheld.bury(unheld.target, self._time)
 
     def _hold(self, target: TrackId, position: Point) -> None:
         task = self._tasks.get(target)
@@ -719,6 +727,7 @@ class Allocation:
         self._tasks[new] = replace(self._tasks.pop(old), id=new)
         self._auctions.pop(old, None)
         self._unheld.bury(old, self._time)
+        self._trails.rename(old, new)
         if self.holding is not None and self.holding.id == old:
             self.holding = replace(self.holding, id=new)
         self.renames.append((old, new))

@@ -1,0 +1,69 @@
+"""Where an agent's tracks have been: so it knows an old word for one of them again."""
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterable
+
+from staniel.cooperation.table import Task
+from staniel.datatypes.belief import TrackId
+from staniel.datatypes.message import Point, Unheld
+
+__all__ = ["Trails"]
+
+_SLACK = 1.0  # a vehicle may have been faster before its track began than it is in it [m/s]
+
+
+class Trails:
+    """The places of live tracks over the last time.
+
+    Parameters
+    ----------
+    memory : float [s]
+        How long a place is remembered.
+    near : float [m]
+        Two places this close are one target's.
+    """
+
+    def __init__(self, memory: float, near: float) -> None:
+        self._memory, self._near = memory, near
+        self._trails: dict[TrackId, tuple[list[float], list[Point]]] = {}
+
+    def note(self, time: float, tasks: Iterable[Task]) -> None:
+        """Add where the tracks are at `time` [s], and forget those that live no more."""
+        trails = {}
+        for task in tasks:
+            times, places = self._trails.get(task.id, ([], []))
+            times.append(time)
+            places.append(task.position)
+            if times[0] < time - self._memory:
+                del times[0], places[0]
+            trails[task.id] = times, places
+        self._trails = trails
+
+    def rename(self, old: TrackId, new: TrackId) -> None:
+        """The track `old` is called `new` from now on."""
+        if old in self._trails:
+            self._trails[new] = self._trails.pop(old)
+
+    def explains(self, unheld: Unheld, speeds: dict[TrackId, float]) -> bool:
+        """Whether one of the tracks is that target under another name.
+
+        It was there when the target was seen, or began later where the target can have come to.
+
+        Parameters
+        ----------
+        unheld : Unheld
+        speeds : dict of TrackId to float [m/s]
+            Of the live tracks.
+        """
+        for name, (times, places) in self._trails.items():
+            if name == unheld.target:
+                continue
+            k = bisect_left(times, unheld.seen)
+            if k == len(times):
+                continue
+            late = max(times[0] - unheld.seen, 0.0)
+            reach = self._near + late * (speeds.get(name, 0.0) + _SLACK)
+            if math.dist(places[k], unheld.position) <= reach:
+                return True
+        return False
