@@ -1,0 +1,206 @@
+"""The protocol's promises: every pattern of losses on small teams, and what each rule is for."""
+
+import itertools
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from staniel.cooperation import CooperationConfig
+from staniel.datatypes.belief import TrackId
+from staniel.datatypes.message import Acknowledge, Award, Handover, Release, Revoke
+from team_bus import Bus
+
+SETTLED = 8  # ticks: a heartbeat each way, or an auction where both had let go
+
+
+class Scripted(Bus):
+    """A bus that loses what a script says, tick after tick, and then nothing."""
+
+    def __init__(self, poses, targets, script, **options):
+        super().__init__(poses, targets, **options)
+        self.script = script
+
+    def loses(self, message, receiver):
+        pattern = self.script.get(round(self.time), ())
+        return (message.sender, receiver) in pattern
+
+
+def hold(bus, agents, target=0):
+    """Let some agents hold a target, each by its own name, as after a partition."""
+    for agent in agents:
+        bus.sides[agent]._hold(bus.names[agent, target], bus.targets[target])
+
+
+def links(count):
+    return [(a, b) for a in range(count) for b in range(count) if a != b]
+
+
+def subsets(items):
+    return itertools.chain.from_iterable(
+        itertools.combinations(items, size) for size in range(len(items) + 1)
+    )
+
+
+@pytest.mark.parametrize("ahead", [0, 1])
+def test_two_holders_become_one_whatever_is_lost(ahead):
+    """All 4^4 patterns of losses over four ticks, from two holders under two names."""
+    patterns = list(subsets(links(2)))
+    for lost in itertools.product(patterns, repeat=4):
+        poses = [(0, 0, 0.0), (300, 0, math.pi)]
+        bus = Scripted(poses, [(60.0 + 180.0 * ahead, 0.0)], dict(enumerate(lost, 1)))
+        hold(bus, (0, 1))
+        held = []
+        for _ in range(4 + SETTLED):
+            bus.tick()
+            held.append(len(bus.holders(0)))
+        assert held[-1] == 1, lost
+        assert 0 not in held, lost  # they never both yield
+
+
+def test_three_holders_become_one_whatever_is_lost():
+    """All 2^6 patterns of losses in each of two ticks, from three holders."""
+    poses = [(0, 0, 0.0), (300, 0, math.pi), (0, 260, -1.0)]
+    patterns = list(subsets(links(3)))
+    for first, second in itertools.product(patterns, patterns[::3]):
+        bus = Scripted(poses, [(100.0, 40.0)], {1: first, 2: second})
+        hold(bus, (0, 1, 2))
+        bus.run(2 + SETTLED)
+        assert len(bus.holders(0)) == 1, (first, second)
+
+
+@given(st.lists(st.sets(st.sampled_from(links(2))), min_size=12, max_size=12), st.data())
+@settings(max_examples=150, deadline=None)
+def test_crossing_costs_do_not_make_both_yield(lost, data):
+    """Two holders whose costs cross while messages get lost: somebody always holds it."""
+    bus = Scripted([(0, 0, 0.0), (400, 0, math.pi)], [(200, 0)], dict(enumerate(lost, 1)))
+    hold(bus, (0, 1))
+    for _ in range(12):
+        bus.targets[0] = (data.draw(st.floats(20.0, 380.0)), 0.0)
+        for side in bus.sides:
+            if side.holding is not None:
+                side._follow_holding()
+        bus.tick()
+        assert bus.holders(0)
+
+
+def test_a_handover_leaves_no_gap():
+    bus = Bus([(0, 0, 0.0), (900, 0, math.pi)], [(100, 0)]).run(6)
+    assert bus.holders(0) == [0]
+    bus.targets[0] = (850.0, 0.0)
+    for _ in range(10):
+        bus.tick()
+        assert bus.holders(0)
+    assert bus.holders(0) == [1]
+    assert bus.said(Handover)
+    assert not bus.said(Revoke)
+
+
+def test_a_winner_acknowledges_and_a_lost_award_is_said_again():
+    """The award is lost on its first way; the auctioneer says the same once more."""
+
+    class Deaf(Bus):
+        awards = 0
+
+        def loses(self, message, receiver):
+            if isinstance(message, Award) and receiver == message.winner:
+                self.awards += 1
+                return self.awards == 1
+            return False
+
+    bus = Deaf([(0, 0, 0.0), (300, 0, 0.0)], [(290, 30)], seers={0: {0}})
+    bus.trackers[0] = {0}
+    bus.run(12)
+    first, second = bus.said(Award)[:2]
+    assert (first.target, first.winner, first.cost, first.bids) == (
+        second.target, second.winner, second.cost, second.bids,
+    )  # fmt: skip
+    assert first.sequence < second.sequence
+    assert bus.holders(0) == [1]
+    assert [(m.sender, m.auctioneer) for m in bus.said(Acknowledge)] == [(1, 0)]
+
+
+def test_who_is_awarded_two_declines_one_and_the_next_bidder_gets_it():
+    config = CooperationConfig(award="lowest")
+    # Agent 2 is nearest to both targets, each announced by another.
+    poses = [(-300, 0, 0.0), (300, 0, math.pi), (0, 10, 0.0), (0, -200, 0.0)]
+    bus = Bus(poses, [(-40, 0), (40, 0)], seers={0: {0}, 1: {1}}, config=config)
+    for agent, k in bus.names:
+        bus.names[agent, k] = TrackId(0.0, k, 1)
+    bus.run(14)
+    assert any(not m.lost for m in bus.said(Release))
+    assert sorted(len(bus.holders(k)) for k in (0, 1)) == [1, 1]
+
+
+def test_awards_tell_the_bids_they_come_from():
+    bus = Bus([(0, 0, 0.0), (300, 0, math.pi), (0, 400, 0.0)], [(200, 0)]).run(6)
+    award = bus.said(Award)[0]
+    costs = {offer.bidder: offer.cost for offer in award.bids}
+    assert costs == pytest.approx({k: bus.cost(k, 0) for k in range(3)})
+    assert award.cost == min(costs.values())
+
+
+def test_a_free_agent_takes_what_it_only_heard_of():
+    """Agent 0 knows two targets and can hold one; agent 1 has seen none and tracks none."""
+    bus = Bus([(0, 0, 0.0), (300, 0, 0.0)], [(50, 0), (0, 60)], seers={0: {0}, 1: {0}})
+    bus.trackers = {0: {0}, 1: {0}}
+
+    class Half(type(bus)):
+        def loses(self, message, receiver):
+            # Announcements, bids and awards of agent 0 never arrive: heartbeats have to do.
+            return message.kind not in ("heartbeat",)
+
+    bus.__class__ = Half
+    bus.run(16)
+    assert bus.sides[1].holding is not None
+    assert sorted(len(bus.holders(k)) for k in (0, 1)) == [1, 1]
+
+
+def test_a_blind_holder_lets_go_and_a_blind_agent_takes_nothing():
+    bus = Bus([(0, 0, 0.0), (300, 0, 0.0)], [(50, 0)]).run(6)
+    assert bus.holders(0) == [0]
+    bus.health[0] = "blind"
+    bus.seers[0] = {1}
+    bus.run(10)
+    assert bus.holders(0) == [1]
+    bus.health[1] = "blind"
+    bus.seers[0] = set()
+    bus.run(30)
+    assert bus.holders(0) == []
+
+
+def test_a_weak_holder_keeps_the_target_until_another_has_it():
+    bus = Bus([(0, 0, 0.0), (600, 0, 0.0)], [(50, 0)]).run(6)
+    assert bus.holders(0) == [0]
+    bus.health[0] = "weak"
+    for _ in range(14):
+        bus.tick()
+        assert bus.holders(0)
+    assert bus.holders(0) == [1]
+    # With nobody else it goes on watching.
+    alone = Bus([(0, 0, 0.0)], [(50, 0)]).run(6)
+    alone.health[0] = "weak"
+    assert alone.run(40).holders(0) == [0]
+
+
+def test_who_does_not_cooperate_follows_the_nearest_that_it_sees_and_says_nothing():
+    bus = Bus([(0, 0, 0.0), (10, 0, 0.0)], [(50, 0), (400, 0)])
+    bus.alone = {0, 1}
+    bus.run(5)
+    assert bus.holders(0) == [0, 1]
+    assert {m.kind for m in bus.log} == {"heartbeat"}
+
+
+def test_more_targets_than_agents_are_visited_in_turn():
+    """One agent, three targets, of which it sees the one it holds."""
+    bus = Bus([(0, 0, 0.0)], [(50, 0), (0, 90), (-90, 0)], seers={0: {0}, 1: {0}, 2: {0}})
+    held = []
+    for _ in range(400):
+        bus.tick()
+        mine = [k for k in range(3) if bus.holders(k)]
+        bus.seers = {k: {0} if k in mine or bus.time < 3 else set() for k in range(3)}
+        for k in range(3):
+            bus.trackers[k] = {0} if bus.seers[k] or (mine and k == mine[0]) else set()
+        held += mine
+    assert set(held[-150:]) == {0, 1, 2}
