@@ -59,7 +59,7 @@ def best_for_all(
     Offer or None
         None where others need all who bid.
     """
-    if len(offers) <= 1 or not auctions:
+    if not offers or not auctions:
         return lowest(offers)
     order = tuple(sorted({target, *auctions}))
     place = {name: k for k, name in enumerate(order)}
