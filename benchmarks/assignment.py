@@ -98,8 +98,8 @@ def small(repeats: int) -> None:
 
 def large(sizes: Sequence[int], repeats: int) -> None:
     """Squares of many rows."""
-    table = Table("costs", "n", "who", "ms", "of the best other", title="large matrices")
     for kind, make in KINDS.items():
+        table = Table("n", "who", "ms", "of the best other", title=f"large matrices, {kind}")
         for n in sizes:
             cost = make(n, np.random.default_rng(n))
             rivals: dict[str, Callable[[], Any]] = {
@@ -116,8 +116,8 @@ def large(sizes: Sequence[int], repeats: int) -> None:
             best = min(seconds for name, seconds in medians.items() if name != "assign")
             for name, seconds in medians.items():
                 ratio = f"{seconds / best:.2f}" if name == "assign" else ""
-                table.add_row(kind, str(n), name, f"{1e3 * seconds:.3f}", ratio)
-    CONSOLE.print(table)
+                table.add_row(str(n), name, f"{1e3 * seconds:.3f}", ratio)
+        CONSOLE.print(table)
 
 
 @dataclass(slots=True)

@@ -13,18 +13,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from staniel.kernels.chains import NOBODY, augment
+
 __all__ = ["assign", "optimal", "scaled", "survey", "warm"]
 
 Array = NDArray[Any]
 
-_NOBODY = -1
 _COARSE = 0.25  # first step of the scaling, of the range of the costs
 _FINER = 0.2  # each step of the one before
 _ROUNDS = 2  # of bids without a step
 _BIDS = 2  # a row in each of these rounds
 _WAR = 0.125  # share of rows left over by these rounds that tells of a price war
 _MANY = 256  # rows that scaling is worth its start for
-_BLOCK = 16  # columns, a multiple of what a register holds
 
 
 @njit(cache=True, error_model="numpy")
@@ -50,7 +50,7 @@ def _forward(cost: Array, prices: Array, columns: Array, rows: Array, step: floa
     waiting = np.empty(columns.size, np.int64)
     count = 0
     for i in range(columns.size - 1, -1, -1):
-        if columns[i] == _NOBODY:
+        if columns[i] == NOBODY:
             waiting[count] = i
             count += 1
     while count:
@@ -59,10 +59,10 @@ def _forward(cost: Array, prices: Array, columns: Array, rows: Array, step: floa
         prices[at] += step + (second - best if prices.size > 1 else 0.0)
         outbid = rows[at]
         rows[at], columns[i] = i, at
-        if outbid == _NOBODY:
+        if outbid == NOBODY:
             count -= 1
         else:
-            columns[outbid] = _NOBODY
+            columns[outbid] = NOBODY
             waiting[count - 1] = outbid
 
 
@@ -81,7 +81,7 @@ def _reverse(cost: Array, prices: Array, columns: Array, rows: Array, step: floa
         floor = min(floor, prices[columns[i]])
     for first in range(m):
         j = first
-        while rows[j] == _NOBODY:
+        while rows[j] == NOBODY:
             taker, best, second = 0, -np.inf, -np.inf
             for i in range(n):
                 worth = totals[i] - cost[i, j]
@@ -97,7 +97,7 @@ def _reverse(cost: Array, prices: Array, columns: Array, rows: Array, step: floa
             prices[j] = max(floor, best - cut)
             totals[taker] -= cut
             old = columns[taker]
-            columns[taker], rows[j], rows[old] = j, taker, _NOBODY
+            columns[taker], rows[j], rows[old] = j, taker, NOBODY
             # The column given up is looked at now, or when its turn comes.
             j = old if old <= first else j
 
@@ -124,7 +124,7 @@ def scaled(cost: Array, epsilon: float) -> tuple[Array, Array]:
     columns, rows = np.empty(n, np.int64), np.empty(m, np.int64)
     step = max(epsilon, _COARSE * (cost.max() - cost.min()))
     while True:
-        columns[:], rows[:] = _NOBODY, _NOBODY
+        columns[:], rows[:] = NOBODY, NOBODY
         _forward(cost, prices, columns, rows, step)
         if n < m:
             _reverse(cost, prices, columns, rows, step)
@@ -148,7 +148,7 @@ def _least_of_columns(cost: Array, prices: Array, columns: Array, rows: Array) -
             at[j] = i if less else at[j]
     for j in range(n - 1, -1, -1):
         prices[j] = -prices[j]
-        if columns[at[j]] == _NOBODY:
+        if columns[at[j]] == NOBODY:
             columns[at[j]], rows[j] = j, at[j]
 
 
@@ -164,7 +164,7 @@ def _bid_without_step(cost: Array, prices: Array, columns: Array, rows: Array) -
     for _ in range(_ROUNDS):
         count = 0
         for i in range(n):
-            if columns[i] == _NOBODY:
+            if columns[i] == NOBODY:
                 waiting[count] = i
                 count += 1
         turn, bids = 0, 0
@@ -174,12 +174,12 @@ def _bid_without_step(cost: Array, prices: Array, columns: Array, rows: Array) -
             turn += 1
             at, best, second = _best_two(cost[i], prices)
             outbid = rows[at]
-            if outbid != _NOBODY:
+            if outbid != NOBODY:
                 if not best < second < np.inf:
                     continue
                 turn -= 1
                 waiting[turn] = outbid
-                columns[outbid] = _NOBODY
+                columns[outbid] = NOBODY
             rows[at], columns[i] = i, at
             if second < np.inf:
                 prices[at] += second - best
@@ -194,121 +194,9 @@ def _keep_exact(cost: Array, prices: Array, columns: Array, rows: Array) -> None
         j = columns[i]
         at, best, _ = _best_two(cost[i], prices)
         if cost[i, j] + prices[j] > best:
-            rows[j], columns[i] = _NOBODY, _NOBODY
-            if rows[at] == _NOBODY:
+            rows[j], columns[i] = NOBODY, NOBODY
+            if rows[at] == NOBODY:
                 rows[at], columns[i] = i, at
-
-
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "nsz"}, forceinline=True)
-def _relax_part(
-    first: int,
-    last: int,
-    costs: Array,
-    prices: Array,
-    less: float,
-    i: int,
-    ways: Array,
-    before: Array,
-) -> float:
-    """As `_relax`, for some columns."""
-    shortest = np.inf
-    for j in range(first, last):
-        way, had, row = costs[j] + prices[j] - less, ways[j], before[j]
-        # Both are there already: a choice without a branch.
-        before[j] = i if way < had else row
-        way = way if way < had else had
-        ways[j] = way
-        shortest = min(shortest, way)
-    return shortest
-
-
-@njit(cache=True, error_model="numpy")
-def _relax(
-    costs: Array,
-    prices: Array,
-    less: float,
-    i: int,
-    ways: Array,
-    before: Array,
-    shortest_of: Array,
-) -> float:
-    """Ways to all columns where row `i` shortens them; returns the shortest.
-
-    `shortest_of` becomes that of each block of columns, so that the ends of the shortest are found
-    without a look at all columns. A whole block is a loop of a length that the compiler knows.
-    """
-    shortest, whole = np.inf, costs.size // _BLOCK
-    for b in range(whole):
-        first = b * _BLOCK
-        least = _relax_part(first, first + _BLOCK, costs, prices, less, i, ways, before)
-        shortest_of[b] = least
-        shortest = min(shortest, least)
-    least = _relax_part(whole * _BLOCK, costs.size, costs, prices, less, i, ways, before)
-    shortest_of[whole] = least
-    return min(shortest, least)
-
-
-@njit(cache=True, error_model="numpy")
-def _close(
-    level: float,
-    ways: Array,
-    open_: Array,
-    shortest_of: Array,
-    rows: Array,
-    closed: Array,
-    reached: Array,
-    count: int,
-) -> tuple[int, int]:
-    """A free column at the end of a shortest way, or -1 and all of them onto the list `closed`."""
-    first = count
-    for b in range(ways.size // _BLOCK + 1):
-        if shortest_of[b] != level:
-            continue
-        for j in range(b * _BLOCK, min(ways.size, (b + 1) * _BLOCK)):
-            if ways[j] == level:
-                if rows[j] == _NOBODY:
-                    return j, first
-                closed[count], reached[count] = j, level
-                count += 1
-    for k in range(first, count):
-        ways[closed[k]], open_[closed[k]] = np.inf, np.inf
-    return _NOBODY, count
-
-
-@njit(cache=True, error_model="numpy")
-def _augment(cost: Array, prices: Array, columns: Array, rows: Array) -> None:
-    """A shortest chain of changes for each row that has nothing (Jonker and Volgenant 1987).
-
-    All others hold their exact best. A chain ends at a column that is free, and prices along it
-    rise so that all rows hold their exact best again. Columns as near as one another are served
-    in the order found: with costs that are often equal this reaches a free one soonest.
-    """
-    n, m = cost.shape
-    floats, numbers = np.empty((4, m + 1)), np.empty((2, m), np.int64)
-    ways, open_, reached, shortest_of = floats[0, :m], floats[1], floats[2], floats[3]
-    before, closed = numbers[0], numbers[1]
-    for start in range(n):
-        if columns[start] != _NOBODY:
-            continue
-        ways[:], open_[:m] = np.inf, prices
-        turn, count, i, less, level = 0, 0, start, 0.0, -np.inf
-        while True:
-            shortest = _relax(cost[i], open_, less, i, ways, before, shortest_of)
-            if turn == count or shortest <= level:
-                level = shortest
-                j, count = _close(level, ways, open_, shortest_of, rows, closed, reached, count)
-                if j != _NOBODY:
-                    break
-            j = closed[turn]
-            i = rows[j]
-            less = cost[i, j] + prices[j] - reached[turn]
-            turn += 1
-        for k in range(count):
-            prices[closed[k]] += level - reached[k]
-        while columns[start] == _NOBODY:
-            i = before[j]
-            rows[j] = i
-            columns[i], j = j, columns[i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -331,17 +219,17 @@ def optimal(cost: Array) -> tuple[Array, Array]:
     """
     n, m = cost.shape
     prices = np.zeros(m)
-    columns, rows = np.full(n, _NOBODY), np.full(m, _NOBODY)
+    columns, rows = np.full(n, NOBODY), np.full(m, NOBODY)
     if n == m:
         _least_of_columns(cost, prices, columns, rows)
     war = _bid_without_step(cost, prices, columns, rows)
-    if war and n == m >= _MANY and (columns == _NOBODY).sum() > _WAR * n:
+    if war and n == m >= _MANY and (columns == NOBODY).sum() > _WAR * n:
         columns, prices = scaled(cost, (cost.max() - cost.min()) / n)
         for i in range(n):
             rows[columns[i]] = i
         _keep_exact(cost, prices, columns, rows)
-    if columns.min() == _NOBODY:
-        _augment(cost, prices, columns, rows)
+    if columns.min() == NOBODY:
+        augment(cost, prices, columns, rows)
     prices -= prices.min()
     return columns, prices
 
@@ -403,7 +291,7 @@ def assign(
     if n <= m:
         columns, prices = _whole(cost, epsilon, barred)
     else:
-        columns, prices = np.full(n, _NOBODY), np.empty(m)
+        columns, prices = np.full(n, NOBODY), np.empty(m)
         owners, worths = _whole(np.ascontiguousarray(cost.T), epsilon, barred)
         for j in range(m):
             columns[owners[j]] = j
@@ -418,9 +306,9 @@ def assign(
     total = 0.0
     for i in range(n):
         j = columns[i]
-        if j != _NOBODY and cost[i, j] == np.inf:
-            columns[i] = _NOBODY
-        elif j != _NOBODY:
+        if j != NOBODY and cost[i, j] == np.inf:
+            columns[i] = NOBODY
+        elif j != NOBODY:
             total += cost[i, j]
             best = _best_two(cost[i], prices)[1]
             happy[i] = cost[i, j] + prices[j] <= best + epsilon + rounding
