@@ -17,7 +17,15 @@ from staniel.datatypes.belief import Percept, Pose, Sighting, TrackId
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.malformed import fault_of
-from staniel.datatypes.message import AssistanceEnd, Award, Bundle, Heartbeat, Looked, Report
+from staniel.datatypes.message import (
+    AssistanceEnd,
+    Award,
+    Bundle,
+    Heartbeat,
+    Looked,
+    Release,
+    Report,
+)
 from staniel.datatypes.wire import encode
 from staniel.guidance import GuidanceConfig
 from staniel.tracking import TrackingConfig
@@ -100,9 +108,10 @@ def test_nothing_is_told_of_what_is_not_yet():
         Report(1, 1, 11.0, sightings=(seen,)),
         Bundle(1, 2, 11.0, claims=(), heard=((1, 11.0),)),
         Report(1, 3, 11.0, sightings=(replace(seen, time=9.0),)),
+        Release(1, 4, 11.0, target=NAME, position=(0.0, 0.0), lost=True, seen=11.0),
     ]
     assert [(m.sequence, m.time) for m in gate.admit(10.0, box)] == [(3, 10.0)]
-    assert counts(gate) == {"stale": 2}
+    assert counts(gate) == {"stale": 3}
 
 
 def test_packets():
