@@ -20,8 +20,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from staniel.datatypes.malformed import faults_of
-from staniel.datatypes.message import Bundle, Message, Report, Warn
+from staniel.datatypes.malformed import fault_of, faults_of
+from staniel.datatypes.message import Message
 from staniel.datatypes.wire import decode
 from staniel.errors import WireError
 
@@ -44,7 +44,6 @@ MOST_SENDERS: Final = 1000
 
 _ALL_COPIES = (1 << COPIES) - 1
 _SKEW: Final = 1.0  # clocks of two aircraft may differ by [s]
-_CLOCK_TOLERANCE: Final = 1e-3  # [s]
 
 
 @dataclass(slots=True)
@@ -179,7 +178,8 @@ class Gate:
             return "forged"
         if not time - self._patience <= said <= time + self._ahead:
             return "stale"
-        if said > time and _foretells(message, time):
+        # Of a clock that is ahead: with what was seen after now it would not have been sound.
+        if said > time and fault_of(replace(message, time=time)) is not None:
             return "stale"
         sequence, known = message.sequence, self._senders.get(sender)
         if known is None or time - known.at > self._patience + self._ahead:
@@ -205,16 +205,3 @@ class Gate:
             since = time - self._patience - self._ahead
             self._senders = {k: v for k, v in self._senders.items() if v.at >= since}
         return len(self._senders) < MOST_SENDERS
-
-
-def _foretells(message: Message, time: float) -> bool:
-    """Whether a message by a clock that is ahead tells what was seen after now."""
-    latest = time + _CLOCK_TOLERANCE
-    match message:
-        case Report(sightings=sightings):
-            return any(seen.time > latest for seen in sightings)
-        case Warn(threats=threats):
-            return any(carrier.time > latest for carrier in threats.carriers)
-        case Bundle(heard=heard):
-            return any(heard_at > latest for _, heard_at in heard)
-    return False
