@@ -30,8 +30,6 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "find": {"city": {"size": (1200.0, 1200.0)}},
     "find, 70 % lost": {"city": {"size": (1200.0, 1200.0)}, "radio": {"loss": 0.7}},
-    "downtown": {},
-    "downtown, 70 % lost": {"radio": {"loss": 0.7}},
 }
 """What is other than in the packaged mission ``downtown``: 4 aircraft, 600 m, 4 vehicles."""
 
