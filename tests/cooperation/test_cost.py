@@ -53,7 +53,7 @@ def test_exposure_is_the_rate_integrated_along_the_way():
 
 def test_visibility_is_the_share_of_a_ring_with_a_free_line():
     wall = [(310.0, 0.0), (330.0, 0.0), (330.0, 200.0), (310.0, 200.0)]
-    chart = City.from_outlines([wall], [60.0], size=(600.0, 600.0))
+    chart = City.from_outlines([shapely.Polygon(wall)], [60.0], size=(600.0, 600.0))
     found = term("visibility", chart=chart, visibility=1.0)
     outline, height, eye = shapely.Polygon(wall), 60.0, AIRFRAME.altitude
     radius, hidden = 2.0 * AIRFRAME.min_turn_radius, 0
@@ -61,9 +61,8 @@ def test_visibility_is_the_share_of_a_ring_with_a_free_line():
         angle = k * math.pi / 6.0
         end = np.array([300.0 + radius * math.cos(angle), 100.0 + radius * math.sin(angle)])
         share = (height - 1.0) / (eye - 1.0)  # of the way from the target up to the roof's height
-        below = shapely.LineString(
-            [(300.0, 100.0), np.array([300.0, 100.0]) * (1 - share) + share * end]
-        )
+        start = np.array([300.0, 100.0])
+        below = shapely.LineString([start, start + share * (end - start)])
         hidden += below.crosses(outline)
     assert 0 < hidden < 12
     assert found == pytest.approx(hidden / 12)
