@@ -21,9 +21,9 @@ from rich.console import Console
 from rich.table import Table
 from scipy.optimize import linear_sum_assignment
 
-from staniel.cooperation import assign
+from staniel.cooperation import Allocation, CooperationConfig, Goal, Price, Task, assign
 from staniel.cooperation.bundles import Bundles, Path, Score
-from staniel.datatypes.belief import TrackId
+from staniel.datatypes.belief import Pose, TrackId
 from staniel.datatypes.message import Bundle
 from staniel.guidance import shortest
 from staniel.kernels import auction
@@ -37,6 +37,7 @@ SIDE = 2000.0  # m, of the square
 SMALL = 20_000  # matrices of 3 by 3
 LOSSES = (0.0, 0.1, 0.3, 0.5, 0.7)
 LIMIT = 300  # rounds
+POSE = Pose(0.0, 0.0, 80.0, 0.0, 0.0, 15.0)
 
 
 def places(n: int, m: int, rng: np.random.Generator) -> Floats:
@@ -128,6 +129,7 @@ class Air:
     loss: float
     rng: np.random.Generator
     messages: int = 0
+    beats: int = 0  # of them heartbeats, which a team says anyway
     inboxes: list[list[Any]] = field(default_factory=list)
 
     def carry(self, said: Sequence[tuple[int, Any]]) -> None:
@@ -198,7 +200,44 @@ def bundles(cost: Floats, air: Air) -> Outcome:
     return Outcome((), None)
 
 
-MODES: dict[str, Mode] = {"batch": batch, "bundles": bundles}
+def auctions(rule: str) -> Mode:
+    """The team's own protocol: agent i finds target i; nothing is handed over afterwards."""
+    config = CooperationConfig(award=rule, handover_margin=1e9, unheld_memory=1e9)
+
+    def mode(cost: Floats, air: Air) -> Outcome:
+        n = len(cost)
+        rows, far = cost.tolist(), 1000.0  # m between two targets, of which no two are one
+        names = [TrackId(0.0, i, 1) for i in range(n)]
+        team = [Allocation(i, config, step=1.0) for i in range(n)]
+
+        def priced(row: list[float]) -> Callable[[Sequence[Goal]], list[Price]]:
+            return lambda goals: [Price(row[round(goal.position[0] / far)]) for goal in goals]
+
+        air.carry([])
+        for k in range(LIMIT):
+            now, said = float(k), []
+            for i, agent in enumerate(team):
+                task = Task(names[i], (far * i, 0.0), 0.0, rows[i][i], True, last_seen=now)
+                words = agent.step(now, POSE, [task], air.inboxes[i], priced(rows[i]))
+                beat = agent.heartbeat("search", (0.0, 0.0))
+                said += [(i, word) for word in words]
+                air.beats += 1
+                said.append((i, beat))
+            held = [None if a.holding is None else a.holding.id.founder for a in team]
+            if None not in held and len(set(held)) == n:
+                return Outcome(tuple(held), k)
+            air.carry(said)
+        return Outcome((), None)
+
+    return mode
+
+
+MODES: dict[str, Mode] = {
+    "batch": batch,
+    "joint auctions": auctions("joint"),
+    "single auctions": auctions("lowest"),
+    "bundles": bundles,
+}
 
 
 def spread(values: Sequence[float], digits: int) -> str:
@@ -225,7 +264,7 @@ def poor_radio(sizes: Sequence[int], seeds: int) -> None:
                         continue
                     summed = sum(cost[i, j] for i, j in enumerate(outcome.columns))
                     ratios.append(summed / assign(cost).cost)
-                    messages.append(air.messages)
+                    messages.append(air.messages - air.beats)
                     rounds.append(outcome.rounds)
                 table.add_row(
                     *(str(n), f"{loss:g}", name, f"{len(rounds)}/{seeds}"),

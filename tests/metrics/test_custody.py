@@ -1,0 +1,104 @@
+"""Who held what, against a slow reading of the same record."""
+
+import math
+
+import numpy as np
+import pytest
+
+import staniel
+from staniel.metrics.custody import custody, longest_run, takeover_times
+
+
+@pytest.fixture(scope="module")
+def run():
+    """A mission with a partition, a radio that dies and an aircraft that is lost."""
+    faults = [
+        {"time": 60.0, "aircraft": 1, "kind": "radio"},
+        {"time": 80.0, "aircraft": 3, "kind": "lost"},
+        {"time": 90.0, "aircraft": 2, "kind": "camera"},
+    ]
+    scenario = staniel.load_scenario(
+        "downtown",
+        seed=5,
+        minutes=2.5,
+        city={"size": [400.0, 400.0]},
+        guidance={"pursuit": "carrot"},
+        faults={"schedule": faults},
+        radio={
+            "loss": 0.3,
+            "range": 450.0,
+            "partitions": [{"start": 30.0, "end": 55.0, "groups": [[0, 1], [2, 3]]}],
+        },
+    )
+    return staniel.fly(scenario).record
+
+
+def slow(record):
+    """Held, doubled and orphaned by loops and words."""
+    n, agents = record.aircraft.shape[:2]
+    vehicles = record.vehicles.shape[1]
+    doubled = np.zeros((n, vehicles), dtype=bool)
+    orphaned = np.zeros_like(doubled)
+    for k, time in enumerate(record.times.tolist()):
+        condition = record.condition[k]
+
+        def talk(a, b, k=k, time=time, condition=condition):
+            apart = 30.0 <= time < 55.0 and (a < 2) != (b < 2)
+            works = all(condition[i, 2] > 0 and condition[i, 3] > 0 for i in (a, b))
+            way = math.dist(record.aircraft[k, a, :3], record.aircraft[k, b, :3])
+            return a != b and works and not apart and way <= 450.0
+
+        targets = {
+            row["agent"]: row["target"]
+            for row in record.decisions
+            if abs(row["time"] - time) < 1e-6
+        }
+        known, held = set(), set()
+        for row in record.tracks[np.abs(record.tracks["time"] - time) < 1e-6]:
+            ways = [math.dist((row["x"], row["y"]), v[:2]) for v in record.vehicles[k]]
+            vehicle = int(np.argmin(ways))
+            if ways[vehicle] <= 15.0:
+                known.add((row["agent"], vehicle))
+                if targets.get(row["agent"]) == row["id"]:
+                    held.add((row["agent"], vehicle))
+        free = {
+            a
+            for a in range(agents)
+            if targets.get(a, "") == "" and condition[a, 1] and condition[a, 2] and condition[a, 3]
+        }
+        for vehicle in range(vehicles):
+            holders = [a for a, v in held if v == vehicle]
+            doubled[k, vehicle] = any(talk(a, b) for a in holders for b in holders)
+            orphaned[k, vehicle] = not holders and any(
+                a == b or talk(a, b) for a, v in known if v == vehicle for b in free
+            )
+    return doubled, orphaned
+
+
+def test_against_a_slow_reading(run):
+    kept = custody(run)
+    doubled, orphaned = slow(run)
+    np.testing.assert_array_equal(kept.doubled, doubled)
+    np.testing.assert_array_equal(kept.orphaned, orphaned)
+    assert kept.held.any(axis=(0, 1)).sum() >= 2
+    assert orphaned.any()
+
+
+def test_the_longest_run():
+    flags = np.array([[1, 0], [1, 1], [0, 1], [1, 1], [1, 0]], dtype=bool)
+    assert longest_run(flags, 0.5) == 1.5
+    assert longest_run(np.zeros((4, 2), dtype=bool), 1.0) == 0.0
+    assert longest_run(np.zeros((4, 0), dtype=bool), 1.0) == 0.0
+
+
+def test_how_long_a_lost_holders_target_waits(run):
+    kept = custody(run)
+    loss = 80.0
+    before = int(np.flatnonzero(run.times < loss)[-1])
+    mine = np.flatnonzero(kept.held[before, 3])
+    found = takeover_times(run, kept, loss, 3)
+    assert len(found) == len(mine)
+    for vehicle, wait in zip(mine, found, strict=True):
+        others = [k for k in range(before + 1, len(run.times)) if kept.held[k, :3, vehicle].any()]
+        assert wait == (run.times[others[0]] - loss if others else math.inf)
+    assert takeover_times(run, kept, 0.0, 3) == []
