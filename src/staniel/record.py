@@ -12,12 +12,13 @@ from staniel.city import City
 from staniel.datatypes.belief import Belief, Percept
 from staniel.datatypes.command import Command
 from staniel.datatypes.equipment import Camera
-from staniel.datatypes.message import Delivery
+from staniel.datatypes.message import COST_TERMS, Delivery
 from staniel.datatypes.risk import RiskConfig
 from staniel.datatypes.truth import CONDITION_COLUMNS, Truth, nominal
 from staniel.errors import RecordError
 
 __all__ = [
+    "AWARD_DTYPE",
     "COMMAND_DTYPE",
     "DECISION_DTYPE",
     "MESSAGE_DTYPE",
@@ -81,6 +82,10 @@ COMMAND_DTYPE = _columns(
     "time:f8 agent:i4 kind:U8 ax:f8 ay:f8 bx:f8 by:f8 radius:f8 turn:i4 speed:f8 altitude:f8"
 )
 THREAT_DTYPE = _columns("time:f8 agent:i4 kind:U8 origin:i4 x:f8 y:f8 cxx:f8 cxy:f8 cyy:f8")
+AWARD_DTYPE = _columns(
+    "time:f8 auctioneer:i4 sequence:i8 target:U16 bidder:i4 cost:f8 won:? "
+    + " ".join(f"{term}:f8" for term in COST_TERMS)
+)
 _SAME = 1e-6  # instants this near to each other are one [s]
 
 DECISION_DTYPE = _columns("time:f8 agent:i4 role:U8 target:U16 goal_x:f8 goal_y:f8 guard:U8")
@@ -125,6 +130,12 @@ class Record:
         What threat sensors noticed, in the order of time; not given: nothing. `kind` is ``region``
         or ``carrier``, `origin` the region's number in the scenario or the vehicle; a region has
         NaN for the rest.
+    awards : structured array
+        Why targets went to whom: a row for each bid that an award told, in the order of `messages`
+        and of the award; not given: none. `sequence` is the auctioneer's number of the award, `won`
+        marks the winner's bid. `cost` is NaN where it is not finite, and each of its terms, by the
+        names of `COST_TERMS`, where the bid told none. A winner whose bid was not told has a row
+        of its own, without terms.
     """
 
     scenario: Mapping[str, Any]
@@ -149,6 +160,7 @@ class Record:
     )
     wind: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0, 2)))
     threats: NDArray[np.void] = field(default_factory=lambda: np.zeros(0, dtype=THREAT_DTYPE))
+    awards: NDArray[np.void] = field(default_factory=lambda: np.zeros(0, dtype=AWARD_DTYPE))
 
     def __post_init__(self) -> None:
         ticks, count = self.aircraft.shape[:2]

@@ -14,6 +14,7 @@ from staniel.datatypes.message import (
     Bid,
     Delivery,
     Heartbeat,
+    Offer,
     Release,
     Report,
     Revoke,
@@ -23,6 +24,7 @@ from staniel.record import Frame
 
 CLOCK = Clock()
 VERSION = "0.0.test"
+TERMS = (90.0, 4.0, 0.5, 12.25, 0.0, 3.125, -5.0, -2.0)
 
 
 def scenario(minutes=1.0, seed=7):
@@ -189,10 +191,21 @@ def _messages(truth, agent, own, belief, sightings):
     if target is not None and truth.tick % 20 == agent:
         other = (agent + 1) % len(truth.aircraft)
         yield Announce(agent, number + 2, time, target, place, 0.5, 120.0)
-        yield Bid(agent, number + 3, time, (target,), (other,), (130.25,))
-        yield Award(agent, number + 4, time, target, place, other, 99.5)
+        yield Bid(agent, number + 3, time, *_bid(belief, other))
+        unable = Offer((agent + 2) % len(truth.aircraft), math.inf)
+        bids = (Offer(agent, 101.0 + agent, TERMS), Offer(other, 99.5, TERMS[:2]), unable)
+        yield Award(agent, number + 4, time, target, place, other, 99.5, bids)
+        yield Award(agent, number + 7, time, target, place, other, 99.5)
         yield Revoke(agent, number + 5, time, target, other, target, place, 88.0)
         yield Release(agent, number + 6, time, target, place, True)
+
+
+def _bid(belief, auctioneer):
+    """One bid for all targets, the agent's own first, of which only the first cost is told."""
+    others = [track.id for track in belief.tracks if track.id != belief.target]
+    targets = (belief.target, *others)
+    costs = (130.25, *[math.inf] * len(others))
+    return targets, (auctioneer,) * len(targets), costs, (TERMS, *[()] * len(others))
 
 
 def open_city():

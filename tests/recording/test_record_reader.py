@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from mcap.writer import CompressionType, Writer
 
 from staniel.city import City
+from staniel.datatypes.message import COST_TERMS
 from staniel.errors import RecordError
 from staniel.recording import Recorder, read_record
 
@@ -175,6 +176,68 @@ TRACK = {
     "id": "0-1",
     "existence": 1.0,
 }
+
+
+AWARD = {
+    **{"time": 1.0, "sender": 0, "sequence": 5, "kind": "award", "target": "0-1", "winner": 2},
+    **{"cost": 80.0, "x": 1.0, "y": 2.0, "receivers": 2, "heard_by": [1]},
+}
+BID = {"bidder": 1, "cost": 90.5, "terms": {"distance": 90.0, "energy": 0.5}}
+
+
+def awarding(**changes):
+    """An award in the second tick, as an older record has it but for the changes."""
+    return setting("messages", to=[{**AWARD, **changes}])
+
+
+def bidding(**changes):
+    return awarding(bids=[{**BID, **changes}])
+
+
+def test_an_award_without_bids_tells_of_its_winner_alone(tmp_path):
+    old = read_record(forge(tmp_path / "old.mcap", {"/staniel/messages": awarding()}))
+    assert len(old.awards) == 2  # One a tick.
+    row = old.awards[0]
+    assert row.tolist()[:7] == (1.0, 0, 5, "0-1", 2, 80.0, True)
+    assert all(np.isnan(row[name]) for name in COST_TERMS)
+
+
+def test_terms_of_other_versions_do_no_harm(tmp_path):
+    change = bidding(terms={"distance": 90.5, "noise": 3.0})
+    row = read_record(forge(tmp_path / "new.mcap", {"/staniel/messages": change})).awards[0]
+    assert (row["bidder"], row["won"], row["distance"]) == (1, False, 90.5)
+    assert np.isnan(row["energy"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        awarding(bids=None),
+        awarding(bids={"bidder": 1}),
+        awarding(bids="many"),
+        awarding(bids=[3]),
+        awarding(bids=[{}]),
+        awarding(bids=[BID] * 101),
+        bidding(bidder="a"),
+        bidding(bidder=2**40),
+        bidding(bidder=None),
+        bidding(bidder=[1]),
+        bidding(cost="cheap"),
+        bidding(cost=1e13),
+        bidding(cost=10**400),
+        bidding(terms=None),
+        bidding(terms=[90.0]),
+        bidding(terms={"distance": "far"}),
+        bidding(terms={"distance": {}}),
+        bidding(terms={"energy": -1e12}),
+        awarding(sequence=2**70, bids=[BID]),
+        awarding(target=7, bids=[BID]),
+    ],
+)
+def test_bids_that_break_the_rules_are_refused(tmp_path, change):
+    file = forge(tmp_path / "bad.mcap", {"/staniel/messages": change})
+    with pytest.raises(RecordError, match=r"bad\.mcap: /staniel/messages"):
+        read_record(file)
 
 
 @pytest.mark.parametrize(

@@ -17,13 +17,13 @@ from mcap.reader import make_reader
 from staniel.city import City
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import FlyBanks
-from staniel.datatypes.message import Award, Heartbeat, Report
+from staniel.datatypes.message import COST_TERMS, Award, Bid, Heartbeat, Report
 from staniel.datatypes.risk import RiskRegion
 from staniel.datatypes.threats import Carrier, Threats
 from staniel.errors import OutputError
 from staniel.recording import Recorder, read_record
 from staniel.recording.encode import FineSteps
-from staniel.recording.schemas import OPTIONAL_TOPICS, SCHEMAS
+from staniel.recording.schemas import MOST_OFFERS, OPTIONAL_TOPICS, SCHEMAS
 
 TICKS = 40
 
@@ -131,6 +131,57 @@ def test_messages_come_back(path, frames):
             assert row["target"] == ""
             assert math.isnan(row["x"])
     assert kinds == {"heartbeat", "report", "announce", "bid", "award", "revoke", "release"}
+
+
+def test_the_bids_of_awards_come_back(path, frames):
+    sent = [delivery.message for frame in frames for delivery in frame.deliveries]
+    wanted = []
+    for award in sent:
+        if isinstance(award, Award):
+            said = award.time, award.sender, award.sequence, str(award.target)
+            for bidder, cost, terms in award.bids or ((award.winner, award.cost, ()),):
+                cost = cost if math.isfinite(cost) else math.nan
+                told = [*terms, *[math.nan] * (len(COST_TERMS) - len(terms))]
+                wanted.append((*said, bidder, cost, bidder == award.winner, *told))
+    back = read_record(path).awards
+    assert len(wanted) >= 20
+    assert np.array_equal(
+        np.array(wanted, dtype=back.dtype).view(f"V{back.itemsize}"), back.view(f"V{back.itemsize}")
+    )
+    assert back["won"].sum() == sum(isinstance(message, Award) for message in sent)
+
+
+def test_a_bid_is_written_with_all_its_targets(path, frames):
+    sent = [delivery.message for frame in frames for delivery in frame.deliveries]
+    bids = [message for message in sent if isinstance(message, Bid)]
+    with path.open("rb") as stream:
+        found = [
+            item["offers"]
+            for _, _, message in make_reader(stream).iter_messages("/staniel/messages")
+            for item in json.loads(message.data)["messages"]
+            if item["kind"] == "bid"
+        ]
+    assert max(map(len, found)) > 1
+    for offers, bid in zip(found, bids, strict=True):
+        assert [offer["target"] for offer in offers] == [str(target) for target in bid.targets]
+        assert [offer["auctioneer"] for offer in offers] == list(bid.auctioneers)
+        assert [offer["cost"] for offer in offers] == [130.25, *[None] * (len(offers) - 1)]
+        assert offers[0]["terms"] == dict(zip(COST_TERMS, synthetic_run.TERMS, strict=True))
+        assert all(offer["terms"] == {} for offer in offers[1:])
+
+
+def test_no_more_bids_are_recorded_than_the_schema_allows(tmp_path, city, frames):
+    (k,) = [k for k, frame in enumerate(frames) if frame.truth.tick == 20]
+    deliveries = [
+        replace(d, message=replace(d.message, bids=d.message.bids[:1] * 1000, winner=2))
+        for d in frames[k].deliveries
+        if isinstance(d.message, Award)
+    ]
+    many = [replace(frames[k], deliveries=deliveries[:1])]
+    back = read_record(record(tmp_path / "many.mcap", city, many)).awards
+    assert len(back) == MOST_OFFERS + 1  # The winner's own is always there.
+    assert back["bidder"].tolist() == [*[0] * MOST_OFFERS, 2]
+    assert back["won"].nonzero()[0].tolist() == [MOST_OFFERS]
 
 
 def test_commands_and_decisions_come_back(path, frames):

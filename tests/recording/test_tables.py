@@ -11,7 +11,7 @@ from staniel.city import City
 from staniel.errors import OutputError
 from staniel.recording import Recorder, export, read_record, tracks_table, truth_table
 
-NAMES = ["truth", "sightings", "threats", "tracks", "messages", "commands", "decisions"]
+NAMES = ["truth", "sightings", "threats", "tracks", "messages", "awards", "commands", "decisions"]
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.city import City
+from staniel.datatypes.message import COST_TERMS
 from staniel.datatypes.truth import (
     AIRCRAFT_COLUMNS,
     CONDITION_COLUMNS,
@@ -19,6 +20,7 @@ from staniel.datatypes.truth import (
 )
 from staniel.errors import CityError, RecordError
 from staniel.record import (
+    AWARD_DTYPE,
     COMMAND_DTYPE,
     DECISION_DTYPE,
     MESSAGE_DTYPE,
@@ -27,7 +29,7 @@ from staniel.record import (
     TRACK_DTYPE,
     Record,
 )
-from staniel.recording.schemas import FORMAT, TICK_TOPICS
+from staniel.recording.schemas import FORMAT, MOST_OFFERS, TICK_TOPICS
 
 __all__ = ["Contents", "decode"]
 
@@ -76,10 +78,15 @@ def decode(contents: Contents) -> Record:
     city = _city(contents)
     ticks = _whole_ticks(contents.ticks)
     truth = [entry for _, entry in _entries(ticks, "truth")]
-    poses, hearing = _poses(truth), _Hearing()
+    poses, hearing, bidding = _poses(truth), _Hearing(), _Bidding()
+
+    def message(time: float, item: Mapping[str, Any]) -> Row:
+        bidding.add(item)
+        return hearing.row(time, item)
+
     count = poses["aircraft"].shape[1]
     condition, wind = _conditions(ticks, count)
-    messages = _table(ticks, "messages", MESSAGE_DTYPE, hearing.row, ("cost", "x", "y"))
+    messages = _table(ticks, "messages", MESSAGE_DTYPE, message, ("cost", "x", "y"))
     receptions, links = hearing.gathered(count)
     return Record(
         scenario=scenario,
@@ -97,6 +104,7 @@ def decode(contents: Contents) -> Record:
         condition=condition,
         wind=wind,
         threats=_table(ticks, "threats", THREAT_DTYPE, _threat, ("x", "y", "cxx", "cxy", "cyy")),
+        awards=bidding.gathered(),
     )
 
 
@@ -247,8 +255,13 @@ def _table(
         raise
     except _MALFORMED as error:
         raise _malformed(where, error) from error
-    for name in dtype.names or ():
-        if dtype[name].kind == "f":
+    return _sound(table, where, may_lack)
+
+
+def _sound(table: NDArray[np.void], where: str, may_lack: Sequence[str]) -> NDArray[np.void]:
+    """The table itself, its floats checked."""
+    for name in table.dtype.names or ():
+        if table.dtype[name].kind == "f":
             good = np.abs(table[name]) < _LARGEST
             if name in may_lack:
                 good |= np.isnan(table[name])
@@ -328,6 +341,36 @@ class _Hearing:
         known &= (senders >= 0) & (senders < count)
         links = np.bincount(senders[known] * count + receivers[known], minlength=count * count)
         return receptions, links.reshape(count, count).astype(np.int64)
+
+
+class _Bidding:
+    """What awards tell of the bids for them: taken down award by award, gathered at the end."""
+
+    def __init__(self) -> None:
+        self._rows: list[Row] = []
+
+    def add(self, item: Mapping[str, Any]) -> None:
+        if item["kind"] != "award":
+            return
+        said = item["time"], item["sender"], item["sequence"], _text(item["target"], 16)
+        winner, bids = item["winner"], item.get("bids", [])  # Older records have none.
+        if not isinstance(bids, list) or len(bids) > MOST_OFFERS:
+            raise ValueError(f"bids are not a list of up to {MOST_OFFERS}")
+        if winner is not None and all(bid["bidder"] != winner for bid in bids):
+            bids = [*bids, {"bidder": winner, "cost": item["cost"], "terms": {}}]
+        for bid in bids:
+            bidder, terms = bid["bidder"], bid["terms"]
+            told = [_or_nan(terms.get(name)) for name in COST_TERMS]
+            self._rows.append((*said, bidder, _or_nan(bid["cost"]), bidder == winner, *told))
+
+    def gathered(self) -> NDArray[np.void]:
+        """A record's `awards`."""
+        where = "/staniel/messages, bids"
+        try:
+            table = np.array(self._rows, dtype=AWARD_DTYPE)
+        except _MALFORMED as error:
+            raise _malformed(where, error) from error
+        return _sound(table, where, ("cost", *COST_TERMS))
 
 
 _PATH_COLUMNS: Final = ("ax", "ay", "bx", "by", "radius")

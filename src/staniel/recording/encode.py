@@ -7,6 +7,7 @@ rounding it and `json.dumps` cost, and a tick has some 700 numbers.
 import math
 from collections.abc import Sequence
 from functools import cache
+from itertools import islice
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from staniel.datatypes.belief import Belief, Percept
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyLine, FlyOrbit
 from staniel.datatypes.message import (
+    COST_TERMS,
     Announce,
     Award,
     Bid,
@@ -27,6 +29,7 @@ from staniel.datatypes.message import (
 )
 from staniel.datatypes.truth import NOMINAL, Truth
 from staniel.record import Frame
+from staniel.recording.schemas import MOST_OFFERS
 
 __all__ = ["FINE_STEP", "FineSteps", "encode_tick"]
 
@@ -58,8 +61,10 @@ _TRACK = (
 )
 _MESSAGE = (
     '{"time":%s,"sender":%d,"sequence":%d,"kind":"%s","target":%s,"winner":%s,"cost":%s,'
-    '"x":%s,"y":%s,"receivers":%d,"heard_by":[%s]}'
+    '"x":%s,"y":%s,"receivers":%d,"heard_by":[%s]%s}'
 )
+_BID = '{"bidder":%d,"cost":%s,"terms":{%s}}'
+_OFFER = '{"target":"%s","auctioneer":%d,"cost":%s,"terms":{%s}}'
 _LINE = (
     '{"agent":%d,"kind":"line","start":[%.3f,%.3f],"end":[%.3f,%.3f],"speed":%.3f,"altitude":%.3f}'
 )
@@ -235,7 +240,32 @@ def _message(delivery: Delivery) -> str:
         _metres(y),
         delivery.receivers,
         ",".join(map(str, delivery.heard_by)),
+        _bids(message),
     )
+
+
+def _bids(message: Message) -> str:
+    """What was bid, of an award that tells it and of a bid itself; nothing of other kinds."""
+    match message:
+        case Award(bids=bids):
+            rows = [
+                _BID % (bidder, _metres(cost), _terms(terms))
+                for bidder, cost, terms in bids[:MOST_OFFERS]
+            ]
+            return f',"bids":[{",".join(rows)}]'
+        case Bid(targets=targets, auctioneers=auctioneers, costs=costs):
+            terms = message.terms or ((),) * len(targets)
+            offers = zip(targets, auctioneers, costs, terms, strict=True)
+            rows = [
+                _OFFER % (target, auctioneer, _metres(cost), _terms(parts))
+                for target, auctioneer, cost, parts in islice(offers, MOST_OFFERS)
+            ]
+            return f',"offers":[{",".join(rows)}]'
+    return ""
+
+
+def _terms(terms: Sequence[float]) -> str:
+    return ",".join(f'"{name}":{_metres(term)}' for name, term in zip(COST_TERMS, terms))  # noqa: B905
 
 
 def _contents(message: Message) -> tuple[object | None, int | None, float, float, float]:

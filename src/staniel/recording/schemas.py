@@ -3,9 +3,12 @@
 import json
 from typing import Any, Final
 
+from staniel.datatypes.message import COST_TERMS
+
 __all__ = [
     "FILE_NAME",
     "FORMAT",
+    "MOST_OFFERS",
     "ONCE_TOPICS",
     "OPTIONAL_TOPICS",
     "RUN_METADATA",
@@ -19,6 +22,9 @@ FORMAT: Final = 1
 
 FILE_NAME: Final = "mission.mcap"
 """The record's name in a run folder."""
+
+MOST_OFFERS: Final = 100
+"""How many bids of one message are recorded; a reader refuses more."""
 
 RUN_METADATA: Final = "staniel.run"
 """Name of the metadata record that a finished file ends with."""
@@ -136,6 +142,33 @@ _MESSAGE = _object(
     receivers=_integer("how many could have heard it"),
     heard_by=_list(_integer("aircraft")),
 )
+_COST = _or_null(_number("[m]; null when not finite"))
+_OFFER = {
+    "cost": _COST,
+    "terms": {
+        **_object(),
+        "properties": dict.fromkeys(COST_TERMS, _COST),
+        "description": "what the cost is the sum of; empty: the distance alone",
+    },
+}
+_MESSAGE["properties"] |= {
+    "bids": {
+        **_list(_object(bidder=_integer("aircraft"), **_OFFER)),
+        "maxItems": MOST_OFFERS,
+        "description": "of an award: the bids that it tells",
+    },
+    "offers": {
+        **_list(
+            _object(
+                target=_string("track, founder-serial"),
+                auctioneer=_integer("who announced it"),
+                **_OFFER,
+            )
+        ),
+        "maxItems": MOST_OFFERS,
+        "description": "of a bid: each target that it is for",
+    },
+}
 _COMMAND = {
     **_object(
         agent=_integer("aircraft"),

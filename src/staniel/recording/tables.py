@@ -66,7 +66,7 @@ def export(
 ) -> list[Path]:
     """Write a record's tables, one file each.
 
-    Truth, sightings, threats, tracks, messages, commands and decisions.
+    Truth, sightings, threats, tracks, messages, awards, commands and decisions.
 
     Parameters
     ----------
@@ -111,6 +111,7 @@ def _tables(record: Record) -> Mapping[str, NDArray[np.void]]:
         "threats": record.threats,
         "tracks": record.tracks,
         "messages": record.messages,
+        "awards": record.awards,
         "commands": record.commands,
         "decisions": record.decisions,
     }
