@@ -12,7 +12,7 @@ from staniel.datatypes.belief import Percept, Pose, Sighting
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import Airframe, Camera
-from staniel.datatypes.message import Announce, Award, Heartbeat, Release, Report
+from staniel.datatypes.message import Announce, Award, Heartbeat, Looked, Release, Report
 from staniel.guidance import GuidanceConfig
 from staniel.tracking import TrackingConfig
 
@@ -21,14 +21,14 @@ CHASING = GuidanceConfig(pursuit="carrot")
 SIGMA = np.eye(2) * 1.5**2
 
 
-def agent_of(number=0, guidance=GUIDANCE):
+def agent_of(number=0, guidance=GUIDANCE, cooperation=CooperationConfig()):  # noqa: B008 - frozen
     briefing = Briefing(
         chart=City.open((600.0, 600.0)),
         clock=Clock(),
         airframe=Airframe(),
         camera=Camera(),
         tracking=TrackingConfig(),
-        cooperation=CooperationConfig(),
+        cooperation=cooperation,
         guidance=guidance,
     )
     return Agent(number, briefing, np.random.default_rng(3))
@@ -153,3 +153,28 @@ def test_a_searching_agent_flies_a_leg_to_its_goal():
     (heartbeat,) = said(outbox, Heartbeat)
     assert heartbeat.role == "search"
     assert heartbeat.goal == command.end == agent.belief.goal
+
+
+def test_what_was_looked_at_is_said_every_so_often_and_heeded():
+    teller, hearer = agent_of(0), agent_of(1)
+    words = []
+    for k in range(11):
+        _, outbox = teller.step(percept(k), [])
+        words += said(outbox, Looked)
+    assert [word.time for word in words] == [0.0, 5.0, 10.0]
+    far = Pose(10.0, 10.0, 80.0, 0.0, 0.0, 15.0)
+    hearer.step(percept(11, pose=far), [words[-1]])
+    news = hearer._search.ages
+    assert news[15, 7] == 10.0  # below the teller
+    assert hearer.refused == 0
+
+
+def test_a_word_that_is_none_is_dropped_and_counted():
+    agent = agent_of()
+    agent.step(percept(0), [Looked(1, 1, 0.0, cells=b"nonsense")])
+    assert agent.refused == 1
+
+
+def test_a_team_that_is_not_to_share_is_silent():
+    agent = agent_of(cooperation=CooperationConfig(share_every=0.0))
+    assert not said(agent.step(percept(0), [])[1], Looked)
