@@ -14,7 +14,9 @@ import itertools
 import math
 import multiprocessing
 import sys
+import tempfile
 import time
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +24,10 @@ import numpy as np
 import staniel
 from staniel.cooperation import CooperationConfig
 from staniel.metrics.custody import custody, longest_run
+from staniel.record import Record
+from staniel.recording import Recorder, read_record
+from staniel.scenario.assemble import assemble
+from staniel.scenario.build import build_city
 
 LOSSES = (0.0, 0.3, 0.6, 0.9)
 KILLED = (0.0, 0.25, 0.5)
@@ -80,6 +86,7 @@ def scenario(cell: Cell, seed: int) -> staniel.Scenario:
         vehicles={"count": VEHICLES},
         aircraft={"count": AIRCRAFT},
         guidance={"pursuit": "carrot"},
+        tracking={"particles": 300},
         faults={"schedule": schedule},
         radio={
             "sigma": 1e6, "range": 5000.0, "loss": cell.loss, "duplication": cell.duplication,
@@ -88,11 +95,27 @@ def scenario(cell: Cell, seed: int) -> staniel.Scenario:
     )  # fmt: skip
 
 
+def _record(scenario: staniel.Scenario) -> Record:
+    """Fly, without pictures and figures that nobody looks at here."""
+    city = build_city(scenario.city, scenario.seed)
+    mission = assemble(scenario, city)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "mission.mcap"
+        content, version = scenario.model_dump(mode="json"), staniel.__version__
+        with Recorder(
+            file, scenario=content, version=version, city=city, clock=scenario.clock
+        ) as recorder:
+            for frame in mission.frames():
+                recorder.write(frame)
+            recorder.finish(True)
+        return read_record(file)
+
+
 def fly(job: tuple[Cell, int]) -> tuple[Cell, int, float, float, str]:
     """Longest double holding and orphan of one mission [s], and what it raised, if it did."""
     cell, seed = job
     try:
-        kept = custody(staniel.fly(scenario(cell, seed)).record)
+        kept = custody(_record(scenario(cell, seed)))
     except Exception as error:
         return cell, seed, math.nan, math.nan, f"{type(error).__name__}: {error}"
     return cell, seed, longest_run(kept.doubled, 1.0), longest_run(kept.orphaned, 1.0), ""
@@ -115,7 +138,12 @@ def main(arguments: list[str] | None = None) -> int:
         for done, (cell, *rest) in enumerate(pool.imap_unordered(fly, jobs), 1):
             found[cell].append(rest)
             left = (time.monotonic() - started) / done * (len(jobs) - done)
-            print(f"\r{done}/{len(jobs)} missions, {left:.0f} s left ", end="", file=sys.stderr)
+            print(
+                f"\r{done}/{len(jobs)} missions, {left:.0f} s left ",
+                end="",
+                file=sys.stderr,
+                flush=True,
+            )
     print(file=sys.stderr)
     return _report(found, time.monotonic() - started)
 

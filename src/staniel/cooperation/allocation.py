@@ -55,7 +55,7 @@ UNSOLD_PAUSE = 10.0
 """A busy agent repeats an auction without a bidder after this long [s]."""
 
 BIDS_TOLD = 8
-"""Bids that an award tells of at most, the lowest."""
+"""Bids that an award tells of at most: the winner's and the lowest."""
 
 
 @dataclass(slots=True)
@@ -534,7 +534,9 @@ class Allocation:
             free = any(b.target is None and b.health == "healthy" for b in self._beats.values())
             self._paused[target] = self._time + (2.0 * self._bid_time if free else UNSOLD_PAUSE)
             return
-        told = sorted(offers.values(), key=lambda offer: (offer.cost, -offer.bidder))[:BIDS_TOLD]
+        told = sorted(
+            offers.values(), key=lambda offer: (offer != winner, offer.cost, -offer.bidder)
+        )[:BIDS_TOLD]
         self._say(
             Award,
             target=target,

@@ -50,7 +50,7 @@ def team_metrics(
         **_identity(following.identity),
         "tracks_started": following.tracks_started,
         "false_tracks": following.false_tracks,
-        "auctions": len(set(awards[["target", "sender", "sequence"]].tolist())),
+        "auctions": len(set(awards[["target", "sender", "winner", "cost"]].tolist())),
         "handovers": handovers(record.decisions),
         "messages_sent": len(on_air) if record.aircraft.shape[1] > 1 else len(messages),
         "messages_delivered": int(messages["heard"].sum()),

@@ -18,10 +18,15 @@ from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyLine, FlyOrbit
 from staniel.datatypes.message import (
     COST_TERMS,
+    Acknowledge,
     Announce,
+    AssistanceEnd,
+    AssistanceOffer,
+    AssistanceRequest,
     Award,
     Bid,
     Delivery,
+    Handover,
     Heartbeat,
     Message,
     Release,
@@ -283,6 +288,14 @@ def _contents(message: Message) -> tuple[object | None, int | None, float, float
             return target, None, cost, math.nan, math.nan
         case Release(target=target, position=(x, y)):
             return target, None, math.nan, x, y
+        case Handover(target=target, position=(x, y), cost=cost):
+            return target, None, cost, x, y
+        case AssistanceRequest(target=target, position=(x, y)):
+            return target, None, math.nan, x, y
+        case AssistanceOffer(target=target, cost=cost):
+            return target, None, cost, math.nan, math.nan
+        case Acknowledge(target=target) | AssistanceEnd(target=target):
+            return target, None, math.nan, math.nan, math.nan
     return None, None, math.nan, math.nan, math.nan
 
 
