@@ -126,8 +126,8 @@ def crowd(seeds: int) -> None:
     }
     _compare(
         {
-            "revisits": common,
-            "no revisits": common | {"cooperation": {"revisit_after": 0.0}},
+            "no revisits": common,
+            "revisits": common | {"cooperation": {"revisit_after": 45.0}},
             "ground station": common | {"cooperation": {"mode": "centralised"}},
         },
         seeds,

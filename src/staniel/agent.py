@@ -233,6 +233,8 @@ class Agent:
     def _coverage(self, percept: Percept) -> list[Coverage] | None:
         """What the own camera has just looked at; not known of one whose pictures come late."""
         camera, pose, aim = self._briefing.camera, percept.pose, self._look
+        if not percept.health.camera:
+            return []
         if camera.delay > 0.0:
             return None
 
@@ -255,6 +257,7 @@ class Agent:
         time, pose, config = percept.time, percept.pose, self._briefing.cooperation
         health, allocation = percept.health, self._allocation
         fit = "blind" if not health.camera else "weak" if health.energy < config.weak_below else ""
+        alone = config.mode == "none" or not health.radio
         dangers = self.dangers.at(time, tracks)
         situation = Situation(pose, health.energy, health.camera, dangers.rate if dangers else None)
 
@@ -265,14 +268,13 @@ class Agent:
             inbox,
             lambda goals: self._costs.prices(situation, goals),
             health=fit or "healthy",
-            alone=config.mode == "none" or not health.radio,
+            alone=alone,
         )
         for old, new in allocation.renames:
             self._tracker.rename(old, new)
-        able = allocation.holding is None and not fit
-        said = self._assistance.step(
-            time, pose, allocation.holding, self._need_of_help(), able, inbox
-        )
+        able = allocation.holding is None and not fit and not alone
+        need = None if alone else self._need_of_help()
+        said = self._assistance.step(time, pose, allocation.holding, need, able, inbox)
         outbox += [
             kind(self.id, allocation.next_sequence(), time, **content) for kind, content in said
         ]
@@ -344,7 +346,7 @@ class Agent:
     ) -> tuple[Command, str, Point]:
         """Pursue the held target; else help; else loiter where one was lost; else search."""
         time, pose = percept.time, percept.pose
-        self._look_around(time, pose, inbox)
+        self._look_around(percept, inbox)
         held = self._allocation.holding
         if held is not None:
             track = self._track_named(held.id)
@@ -390,9 +392,11 @@ class Agent:
     def _circle(self, pose: Pose, place: Point) -> Command:
         return loiter(pose, place, self._briefing.airframe, self._briefing.guidance)
 
-    def _look_around(self, time: float, pose: Pose, inbox: Sequence[Message]) -> None:
+    def _look_around(self, percept: Percept, inbox: Sequence[Message]) -> None:
         """Note on the search map what was looked at, by this aircraft and as the others say."""
-        self._search.look(time, pose, self._look)
+        time = percept.time
+        if percept.health.camera:
+            self._search.look(time, percept.pose, self._look)
         self._search.hear(message for message in inbox if isinstance(message, Heartbeat))
         for message in inbox:
             if isinstance(message, Looked):

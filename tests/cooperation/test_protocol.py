@@ -194,7 +194,9 @@ def test_who_does_not_cooperate_follows_the_nearest_that_it_sees_and_says_nothin
 
 def test_more_targets_than_agents_are_visited_in_turn():
     """One agent, three targets, of which it sees the one it holds."""
-    bus = Bus([(0, 0, 0.0)], [(50, 0), (0, 90), (-90, 0)], seers={0: {0}, 1: {0}, 2: {0}})
+    seers = {0: {0}, 1: {0}, 2: {0}}
+    config = CooperationConfig(revisit_after=45.0)
+    bus = Bus([(0, 0, 0.0)], [(50, 0), (0, 90), (-90, 0)], seers=seers, config=config)
     held = []
     for _ in range(400):
         bus.tick()

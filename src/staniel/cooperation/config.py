@@ -93,7 +93,7 @@ class CooperationConfig(Config):
         0.5, ge=0.0, le=1.0, description="predicted visibility below which a holder asks for help"
     )
     revisit_after: float = Field(
-        45.0,
+        0.0,
         ge=0.0,
         description="a holder leaves its target for one that nobody holds and nobody has seen "
         "for this long; 0: never [s]",
