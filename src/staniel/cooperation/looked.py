@@ -16,9 +16,7 @@ Cells without a street say whatever makes the runs long. Times are rounded down 
 the start: who says on what it heard says the same, and a cell never seems younger than it is.
 """
 
-import itertools
 import struct
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,34 +64,35 @@ def pack_looked(
     newest = int(time // QUANTUM)
     steps = newest - np.floor_divide(looked, QUANTUM).astype(np.int64)
     codes = np.where((looked >= 0.0) & (steps <= _OLDEST), steps, _NOTHING).reshape(-1)
-    codes, counts = np.roll(codes, -first), np.roll(streets.reshape(-1), -first)
+    counts = streets.reshape(-1)
+    if first:
+        codes, counts = np.roll(codes, -first), np.roll(counts, -first)
     # What does not count takes the code of what comes before it.
     before = np.maximum.accumulate(np.where(counts, np.arange(len(codes)), -1))
     codes = np.where(before >= 0, codes[before], _NOTHING)
-    bounds = [0, *(np.flatnonzero(np.diff(codes)) + 1).tolist(), len(codes)]
-    out = bytearray(_HEAD.pack(_VERSION, rows, columns, newest, first))
-    for start, end in itertools.pairwise(bounds):
-        code = int(codes[start])
-        if code == _NOTHING and end == len(codes):
-            break
-        run = b"".join(_pieces(code, end - start))
-        if len(out) + len(run) > MOST_BYTES:
-            return bytes(out), (first + start) % len(codes)
-        out += run
-    return bytes(out), 0
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(codes)) + 1))
+    runs, lengths = _pieces(codes[starts], np.diff(np.append(starts, len(codes))))
+    head = _HEAD.pack(_VERSION, rows, columns, newest, first)
+    room = (MOST_BYTES - _HEAD.size) // 2
+    said = lengths[:room] * np.where(runs[:room] == _FAR_NOTHING, _FAR, 1)
+    rest = 0 if len(runs) <= room else (first + int(said.sum())) % len(codes)
+    return head + np.stack((runs, lengths), axis=1)[:room].astype(np.uint8).tobytes(), rest
 
 
-def _pieces(code: int, length: int) -> Iterator[bytes]:
-    """A run as codes with lengths that fit in a byte."""
-    if code == _NOTHING:
-        while length >= _FAR:
-            far = min(length // _FAR, _MOST_OF_A_RUN)
-            yield bytes((_FAR_NOTHING, far))
-            length -= far * _FAR
-    while length > 0:
-        piece = min(length, _MOST_OF_A_RUN)
-        yield bytes((code, piece))
-        length -= piece
+def _pieces(
+    codes: NDArray[np.int64], lengths: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Runs as codes with lengths that fit in a byte; the last is left out if it says nothing."""
+    if codes[-1] == _NOTHING:
+        codes, lengths = codes[:-1], lengths[:-1]
+    far = np.where(codes == _NOTHING, lengths // _FAR, 0)
+    kinds = np.stack((np.full_like(codes, _FAR_NOTHING), codes), axis=1).reshape(-1)
+    amounts = np.stack((far, lengths - _FAR * far), axis=1).reshape(-1)
+    pieces = -(-amounts // _MOST_OF_A_RUN)
+    full = np.full(pieces.sum(), _MOST_OF_A_RUN)
+    some = pieces > 0
+    full[np.cumsum(pieces)[some] - 1] = (amounts - _MOST_OF_A_RUN * (pieces - 1))[some]
+    return np.repeat(kinds, pieces), full
 
 
 def unpack_looked(cells: bytes, shape: tuple[int, int], time: float) -> NDArray[np.float64]:

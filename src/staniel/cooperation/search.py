@@ -92,7 +92,7 @@ class SearchMap:
         """
         if time - self._looked_at >= LOOK_EVERY:
             self._looked_at = time
-            self._mark(self._told, time, pose, aim)
+            self._mark(self._told, [time], [pose], [aim])
 
     def hear(self, heartbeats: Iterable[Heartbeat]) -> None:
         """Take note of where the others are, and of what those have a view of that are not blind.
@@ -102,6 +102,7 @@ class SearchMap:
         heartbeats : iterable of Heartbeat
             In any order; what is older than what was heard of its sender is not heeded.
         """
+        looks = []
         for beat in heartbeats:
             known = self._others.get(beat.sender)
             if known is not None and beat.time <= known.time:
@@ -110,7 +111,14 @@ class SearchMap:
             marked = self._marked.get(beat.sender, -math.inf)
             if beat.health != "blind" and beat.time - marked >= LOOK_EVERY:
                 self._marked[beat.sender] = beat.time
-                self._mark(self._guessed, beat.time, beat.pose, beat.goal)
+                looks.append(beat)
+        if looks:
+            self._mark(
+                self._guessed,
+                [beat.time for beat in looks],
+                [beat.pose for beat in looks],
+                [beat.goal for beat in looks],
+            )
 
     def pack(self, time: float) -> bytes:
         """What was looked at, for the others: what fits into one word of `looked.MOST_BYTES`.
@@ -195,18 +203,24 @@ class SearchMap:
         )
         return int(row), int(column)
 
-    def _mark(self, looked: NDArray[np.float64], time: float, pose: Pose, aim: Point) -> None:
-        places = np.array([pose], dtype=np.float64)
+    def _mark(
+        self,
+        looked: NDArray[np.float64],
+        times: Sequence[float],
+        poses: Sequence[Pose],
+        aims: Sequence[Point],
+    ) -> None:
+        eyes = np.array(poses, dtype=np.float64)
         mark(
             self._chart.walls,
             looked,
             self._places,
             self._cell,
-            places,
-            camera_axes(places, np.array([aim], dtype=np.float64), self._camera.mounting),
+            eyes,
+            camera_axes(eyes, np.array(aims, dtype=np.float64), self._camera.mounting),
             self._camera.half_aperture,
             self._camera.range,
-            time,
+            np.array(times, dtype=np.float64),
         )
 
     def _place(self, index: tuple[int, int] | None) -> Point:

@@ -38,9 +38,9 @@ def mark(
     axes: NDArray[np.float64],
     half_aperture: float,
     reach: float,
-    time: float,
+    times: NDArray[np.float64],
 ) -> None:
-    """Write `time` where a camera at one of `poses` has a free view of a street cell.
+    """Write when a camera at one of `poses` had a free view of a street cell.
 
     What was looked at later stays as it is.
 
@@ -61,7 +61,8 @@ def mark(
     half_aperture : float [rad]
     reach : float [m]
         Greatest slant range.
-    time : float [s]
+    times : (k,) float array [s]
+        When the aircraft had these poses.
     """
     rows, columns = looked.shape
     cosine = math.cos(half_aperture)
@@ -77,7 +78,7 @@ def mark(
                 if in_cone(
                     px - x, py - y, pz - z, axis_x, axis_y, axis_z, cosine, reach
                 ) and line_of_sight(walls, x, y, z, px, py, pz):
-                    looked[row, column] = max(looked[row, column], time)
+                    looked[row, column] = max(looked[row, column], times[k])
 
 
 @njit(cache=True, error_model="numpy")
@@ -155,5 +156,5 @@ def warm() -> None:
     looked, places = np.zeros((1, 1)), np.zeros((1, 1, 3))
     pose = np.array([[0.0, 0.0, 10.0, 0.0, 0.0, 15.0]])
     axes = camera_axes(pose, np.zeros((1, 2)), BODY)
-    mark(warm_walls(), looked, places, 1.0, pose, axes, 1.0, 50.0, 1.0)
+    mark(warm_walls(), looked, places, 1.0, pose, axes, 1.0, 50.0, np.zeros(1))
     choose(looked, places, looked, pose[0], 30.0, pose, np.zeros((1, 2)), np.zeros(1), 1.0)
