@@ -13,6 +13,7 @@ import argparse
 import itertools
 import math
 import multiprocessing
+import signal
 import sys
 import tempfile
 import time
@@ -131,21 +132,26 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = cells()
     if options.cells:
         chosen = chosen[:: max(len(chosen) // options.cells, 1)][: options.cells]
-    jobs = [(cell, 1000 + seed) for cell in chosen for seed in range(options.seeds)]
+    # Seed by seed, so that a run cut short by Ctrl-C has flown all cells alike.
+    jobs = [(cell, 1000 + seed) for seed in range(options.seeds) for cell in chosen]
     started = time.monotonic()
     found: dict[Cell, list[Any]] = {cell: [] for cell in chosen}
-    with multiprocessing.get_context("spawn").Pool(options.workers) as pool:
-        for done, (cell, *rest) in enumerate(pool.imap_unordered(fly, jobs), 1):
-            found[cell].append(rest)
-            left = (time.monotonic() - started) / done * (len(jobs) - done)
-            print(
-                f"\r{done}/{len(jobs)} missions, {left:.0f} s left ",
-                end="",
-                file=sys.stderr,
-                flush=True,
-            )
+    with multiprocessing.get_context("spawn").Pool(options.workers, _leave_stopping) as pool:
+        try:
+            for done, (cell, *rest) in enumerate(pool.imap_unordered(fly, jobs), 1):
+                found[cell].append(rest)
+                left = (time.monotonic() - started) / done * (len(jobs) - done)
+                line = f"\r{done}/{len(jobs)} missions, {left:.0f} s left "
+                print(line, end="", file=sys.stderr, flush=True)
+        except KeyboardInterrupt:
+            pool.terminate()
     print(file=sys.stderr)
-    return _report(found, time.monotonic() - started)
+    return _report({k: v for k, v in found.items() if v}, time.monotonic() - started)
+
+
+def _leave_stopping() -> None:
+    """A Ctrl-C is the parent's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _report(found: dict[Cell, list[Any]], seconds: float) -> int:

@@ -104,7 +104,7 @@ def scenario_of(case: Case, guidance: dict[str, Any], seed: int, minutes: float)
             **(fast if case.speed > 2.0 else {}),
         },
         radio={"loss": case.loss},
-        cooperation={"helpers": case.aircraft - 1},
+        cooperation={"assistance": "always", "helpers": case.aircraft - 1},
         guidance=guidance,
     )
 

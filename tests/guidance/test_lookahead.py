@@ -196,7 +196,12 @@ def test_a_pair_that_looks_ahead_sees_more_than_a_pair_that_chases():
         [
             [
                 seen_share(
-                    flown(6.0, seed=seed, cooperation={"helpers": 1}, guidance={"pursuit": name})
+                    flown(
+                        6.0,
+                        seed=seed,
+                        cooperation={"assistance": "always", "helpers": 1},
+                        guidance={"pursuit": name},
+                    )
                 )
                 for name in ("carrot", "lookahead")
             ]
@@ -223,7 +228,10 @@ def test_a_gimbal_sees_what_it_pursues_far_longer_than_a_camera_fixed_to_the_bod
 
 
 def test_a_helper_joins_by_message_and_two_runs_are_the_same():
-    changes = {"cooperation": {"helpers": 1}, "guidance": {"pursuit": "lookahead"}}
+    changes = {
+        "cooperation": {"assistance": "always", "helpers": 1},
+        "guidance": {"pursuit": "lookahead"},
+    }
     first, second = (flown(minutes=2.0, seed=1, **changes) for _ in range(2))
     assert [frame.commands for frame in first] == [frame.commands for frame in second]
     together = [{belief.role for belief in frame.beliefs} == {"pursue", "help"} for frame in first]

@@ -25,7 +25,10 @@ EXTRAS = {
     "lidar": {"lidar": {"mount": "scanner"}},
     "gimbal": {"camera": {"mount": "gimbal"}},
     "threats": {"risk": DANGERS},
-    "lookahead": {"guidance": {"pursuit": "lookahead"}, "cooperation": {"helpers": 1}},
+    "lookahead": {
+        "guidance": {"pursuit": "lookahead"},
+        "cooperation": {"assistance": "always", "helpers": 1},
+    },
 }
 
 

@@ -166,13 +166,13 @@ def test_what_was_looked_at_is_said_every_so_often_and_heeded():
     hearer.step(percept(11, pose=far), [words[-1]])
     news = hearer._search.ages
     assert news[15, 7] == 10.0  # below the teller
-    assert hearer.refused == 0
+    assert hearer.dropped["malformed"] == 0
 
 
 def test_a_word_that_is_none_is_dropped_and_counted():
     agent = agent_of()
     agent.step(percept(0), [Looked(1, 1, 0.0, cells=b"nonsense")])
-    assert agent.refused == 1
+    assert agent.dropped["malformed"] == 1
 
 
 def test_a_team_that_is_not_to_share_is_silent():

@@ -16,7 +16,9 @@ RISK = {
 
 
 def test_all_that_is_said_in_a_mission_is_sound_and_admitted():
-    scenario = load_scenario("downtown", minutes=1.0, risk=RISK, cooperation={"helpers": 1})
+    scenario = load_scenario(
+        "downtown", minutes=1.0, risk=RISK, cooperation={"assistance": "always"}
+    )
     mission = assemble(scenario, build_city(scenario.city, scenario.seed))
     team = range(len(mission.agents))
     gates = [Gate(agent, team=team) for agent in team]

@@ -9,7 +9,7 @@ from scipy import stats
 
 import staniel
 from staniel.city import City
-from staniel.datatypes.belief import Percept, Pose, Sighting
+from staniel.datatypes.belief import Health, Percept, Pose, Sighting
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import FlyBanks, FlyOrbit
 from staniel.datatypes.equipment import Airframe
@@ -136,7 +136,7 @@ def test_what_is_perceived_with_a_dead_camera_and_with_a_navigation_that_is_off(
     truth = Truth(1, 1.0, aircraft, none, none, aircraft[None], none[None], condition)
     seen = impair(percepts, truth)
     assert seen[0] is percepts[0]
-    assert seen[1] is percepts[1]
+    assert seen[1] == dataclasses.replace(percepts[1], health=Health(camera=False))
     off = poses[2]._replace(x=23.0, y=1.0)
     assert (seen[2].pose, seen[2].sightings) == (off, percepts[2].sightings)
     looks = [[(percept.sightings[0], 7 + i)] for i, percept in enumerate(percepts)]

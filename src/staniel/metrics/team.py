@@ -50,7 +50,7 @@ def team_metrics(
         **_identity(following.identity),
         "tracks_started": following.tracks_started,
         "false_tracks": following.false_tracks,
-        "auctions": len(set(awards[["target", "sender", "winner", "cost"]].tolist())),
+        "auctions": _different(awards),
         "handovers": handovers(record.decisions),
         "messages_sent": len(on_air) if record.aircraft.shape[1] > 1 else len(messages),
         "messages_delivered": int(messages["heard"].sum()),
@@ -58,6 +58,13 @@ def team_metrics(
         "messages_dropped": len(messages) - len(on_air) if record.aircraft.shape[1] > 1 else None,
         "links": link_matrix(record),
     }
+
+
+def _different(awards: NDArray[np.void]) -> int:
+    """How many there are, one that is said again counted once."""
+    costs = np.nan_to_num(awards["cost"], nan=-1.0).tolist()
+    words = awards[["target", "sender", "winner"]].tolist()
+    return len(set(zip(words, costs, strict=True)))
 
 
 def _identity(scores: IdentityScores) -> dict[str, Any]:
