@@ -111,7 +111,7 @@ def flown(request, tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_mission_has_them_all_in_view_and_on_track(flown):
-    """Near means within 10 m of the team picture; 1.4 to 2.6 m are measured, as they fly far off."""
+    """Near means within 10 m of the team picture; 1.4 to 2.6 m are measured from far off."""
     for target in flown.metrics["targets"]:
         assert target["visible_fraction"] > 0.999
         assert target["tracked_fraction"] > 0.98
