@@ -285,7 +285,9 @@ class Allocation:
                 del self._leases[sender]
             return
         self._lease(message, target, message.cost)
-        own = self._own_name(target, _moved(message, position, self._time))
+        place = _moved(message, position, self._time)
+        self._uncross(target, place)
+        own = self._own_name(target, place)
         self._settle(target, sender)
         if self.holding is not None and self.holding.id in (target, own):
             # Both as of the same instant: never do both yield.
@@ -722,6 +724,23 @@ class Allocation:
             if distance <= nearest:
                 nearest, name = distance, task.id
         return name
+
+    def _uncross(self, target: TrackId, position: Point) -> None:
+        """Exchange two names that a holder uses the other way round: its names rule."""
+        task, near = self._tasks.get(target), self._config.same_target / 2.0
+        if task is None or math.dist(task.position, position) <= near:
+            return
+        others = [other for other in self._tasks.values() if other.id != target]
+        nearest = min(others, key=lambda o: math.dist(o.position, position), default=None)
+        if nearest is None or math.dist(nearest.position, position) > near:
+            return
+        other, held = nearest.id, None if self.holding is None else self.holding.id
+        aside = TrackId(self._time, self._agent, 2**31 + self._sequence % 2**31)
+        self.renames += [(target, aside), (other, target), (aside, other)]
+        self._tasks[target] = replace(nearest, id=target)
+        self._tasks[other] = replace(task, id=other)
+        if self.holding is not None and held in (target, other):
+            self.holding = replace(self.holding, id=other if held == target else target)
 
     def _rename(self, old: TrackId | None, new: TrackId) -> None:
         if old is None or old == new or new in self._tasks or old not in self._tasks:
