@@ -206,3 +206,16 @@ def test_more_targets_than_agents_are_visited_in_turn():
             bus.trackers[k] = {0} if bus.seers[k] or (mine and k == mine[0]) else set()
         held += mine
     assert set(held[-150:]) == {0, 1, 2}
+
+
+def test_names_that_a_holder_uses_the_other_way_round_are_exchanged():
+    """Two vehicles passed close by, and each agent knows them by the other's names."""
+    one, two = TrackId(0.0, 0, 1), TrackId(0.0, 0, 2)
+    names = {(0, 0): one, (0, 1): two, (1, 0): two, (1, 1): one}
+    bus = Bus([(0, 0, 0.0), (300, 0, math.pi)], [(100, 0), (120, 0)], names=names)
+    hold(bus, (0,), 0)
+    bus.run(3)
+    assert bus.names[1, 0] == bus.names[0, 0]
+    assert bus.names[1, 1] == bus.names[0, 1]
+    bus.run(8)
+    assert [bus.holders(0), bus.holders(1)] in ([[0], [1]], [[1], [0]])
