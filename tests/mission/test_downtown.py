@@ -96,7 +96,7 @@ def test_real_maps_fly(name, tmp_path):
 
 
 def test_it_is_fast(runs, tmp_path):
-    """A guard against slips, far below what `make bench` measures; machines differ by half."""
+    """A guard against slips, far below what `make bench` measures on a quiet machine."""
     chasing = [
         staniel.fly(
             staniel.load_scenario("downtown", seed=seed, guidance={"pursuit": "carrot"}),
@@ -104,5 +104,5 @@ def test_it_is_fast(runs, tmp_path):
         )
         for seed in range(3)
     ]
-    for flown, least in ((runs, 25.0), (chasing, 100.0)):
+    for flown, least in ((runs, 40.0), (chasing, 100.0)):
         assert statistics.median(run.metrics["real_time_factor"] for run in flown) > least
