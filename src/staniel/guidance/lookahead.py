@@ -22,11 +22,12 @@ from staniel.guidance.config import LookaheadConfig
 from staniel.guidance.pursuit import NoFeasibleFlightError, Partner, Pursuit, pursuit_policy
 from staniel.kernels.flight import MAX_BANKS
 from staniel.kernels.forecast import discredit, forecast
-from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookahead import plan
 from staniel.kernels.lookout import Eye, roll_out, shade
 from staniel.kernels.moves import new_moves
 from staniel.kernels.outlook import Outlook, free_shares, new_outlook
 from staniel.kernels.risk import Regions
+from staniel.kernels.scene import Search
 from staniel.kernels.sightlines import Sightlines, new_sightlines
 
 __all__ = ["lookahead", "new_search"]
@@ -36,6 +37,7 @@ Floats = NDArray[np.float64]
 _HOLD = 1.0  # of each bank [s]
 _SAMPLES = 2  # looks in a hold
 _STEP = _HOLD / _SAMPLES
+_FINEST = 4  # halvings of the way from bank to bank, beyond which it makes no difference
 _MISS = 0.1  # probability that a camera misses what it could see
 _MOST_LOOKS = 40  # in vain, that are remembered
 _OLDEST_PLAN = 6.0  # of a partner that is still counted on [s]
@@ -118,11 +120,10 @@ def new_search(
     free = free_shares(chart.walls, *chart.size, airframe.altitude, target_height)
     below = airframe.altitude - target_height
     return Search(
-        new_moves(banks, speed, *roll, _STEP, _SAMPLES, eye.mount),
+        new_moves(banks, 1 << min(config.polish, _FINEST), speed, *roll, _STEP, _SAMPLES, eye.mount),
         config.horizon,
         _SAMPLES,
         _STEP,
-        *roll,
         config.width,
         config.discount,
         config.effort,

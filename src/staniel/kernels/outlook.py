@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from staniel.kernels.footprint import BODY, in_cone
 from staniel.kernels.lookout import Eye, aim, glide
+from staniel.kernels.pieces import woven
 from staniel.kernels.walls import Walls, inside, line_of_sight, warm_walls
 
 __all__ = [
@@ -55,6 +56,8 @@ class Outlook(NamedTuple):
     """[rad]"""
     fading: float
     """What a metre beyond the table leaves of a worth: the discount over the time it takes."""
+    most: float
+    """Greatest of the values."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,7 +94,7 @@ def free_shares(walls: Walls, width: float, depth: float, altitude: float, low: 
     return free / tried
 
 
-@njit(cache=True, error_model="numpy")
+@woven
 def outlook(table: Outlook, ahead: float, left: float, bank: float) -> float:
     """Worth of a state: linear between the table's entries, fading beyond them."""
     reach = REACH - 1e-9
@@ -194,7 +197,7 @@ def new_outlook(
                         ahead, left = c * (u - x) + d * (v - y), c * (v - y) - d * (u - x)
                         sight[i, j, b, a] += worth[s] * _sight(eye, free, ahead, left, height, bank)
     later = discount ** (step * samples)
-    table = Outlook(np.zeros((SIZE, SIZE, _BANKS)), limit, discount ** (1.0 / speed))
+    table = Outlook(np.zeros((SIZE, SIZE, _BANKS)), limit, discount ** (1.0 / speed), 0.0)
     for _ in range(_ROUNDS):
         for i in range(SIZE):
             for j in range(SIZE):
@@ -208,7 +211,7 @@ def new_outlook(
                         total = sight[i, j, b, a] + later * outlook(table, ahead, left, bank)
                         best = max(best, total)
                     table.values[i, j, b] = best
-    return table
+    return Outlook(table.values, limit, table.fading, table.values.max())
 
 
 def warm() -> None:
