@@ -13,9 +13,9 @@ from staniel.datatypes.equipment import Camera
 from staniel.kernels.flight import BANKS, COMMAND_WIDTH, fly
 from staniel.kernels.footprint import BODY
 from staniel.kernels.forecast import discredit, forecast
-from staniel.kernels.lookahead import Search, plan
+from staniel.kernels.lookahead import plan
 from staniel.kernels.lookout import Eye, no_regions, roll_out, shade, watch
-from staniel.kernels.moves import entry_of, new_moves
+from staniel.kernels.moves import entry_of, nearest, new_moves
 from staniel.kernels.outlook import (
     REACH,
     RING,
@@ -27,6 +27,7 @@ from staniel.kernels.outlook import (
     outlook,
 )
 from staniel.kernels.risk import Regions
+from staniel.kernels.scene import Search
 from staniel.kernels.sightlines import AIR, GROUND, SLOTS, new_sightlines, sees, slot_of
 from staniel.kernels.walls import inside_points, line_of_sight
 
@@ -97,13 +98,13 @@ def gimbal(half_aperture_deg=25.0, limit_deg=40.0):
     return Eye(camera.mounting, math.radians(half_aperture_deg), EYE.reach)
 
 
-NO_HOPE = Outlook(np.zeros((SIZE, SIZE, 5)), LIMIT, 1.0)
+NO_HOPE = Outlook(np.zeros((SIZE, SIZE, 5)), LIMIT, 1.0, 0.0)
 """After its end a flight is worth nothing."""
 
 
 def search(banks=(-LIMIT, 0.0, LIMIT), eye=EYE, **changes):
-    moves = new_moves(np.array(banks), SPEED, ROLL_GAIN, ROLL_RATE, 0.5, 2, eye.mount)
-    usual = Search(moves, 3, 2, 0.5, ROLL_GAIN, ROLL_RATE, 200, 0.9, 0.0, 0, NO_HOPE)
+    moves = new_moves(np.array(banks), 8, SPEED, ROLL_GAIN, ROLL_RATE, 0.5, 2, eye.mount)
+    usual = Search(moves, 3, 2, 0.5, 200, 0.9, 0.0, 0, NO_HOPE)
     return usual._replace(**changes)
 
 
@@ -371,9 +372,12 @@ def test_what_a_partner_sees_counts_for_little():
 @pytest.mark.parametrize("seed", range(3))
 def test_the_table_of_moves_is_what_a_roll_out_flies(seed):
     rng = np.random.default_rng(seed)
-    moves = new_moves(LIMIT * np.linspace(-1.0, 1.0, 5), SPEED, ROLL_GAIN, ROLL_RATE, 0.5, 2, BODY)
+    moves = new_moves(
+        LIMIT * np.linspace(-1.0, 1.0, 5), 4, SPEED, ROLL_GAIN, ROLL_RATE, 0.5, 2, BODY
+    )
     for _ in range(50):
-        bank, k = rng.uniform(-LIMIT, LIMIT), rng.integers(5)
+        bank, k = rng.uniform(-LIMIT, LIMIT), rng.integers(17)
+        assert nearest(moves, moves.banks).tolist() == list(range(17))
         start = np.array([0.0, 0.0, 60.0, 0.0, bank, SPEED])
         poses = roll_out(start, moves.banks[k : k + 1], 1.0, 0.0, 2, 0.5, ROLL_GAIN, ROLL_RATE)
         entry, share = entry_of(moves, bank)

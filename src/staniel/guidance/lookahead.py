@@ -120,7 +120,9 @@ def new_search(
     free = free_shares(chart.walls, *chart.size, airframe.altitude, target_height)
     below = airframe.altitude - target_height
     return Search(
-        new_moves(banks, 1 << min(config.polish, _FINEST), speed, *roll, _STEP, _SAMPLES, eye.mount),
+        new_moves(
+            banks, 1 << min(config.polish, _FINEST), speed, *roll, _STEP, _SAMPLES, eye.mount
+        ),
         config.horizon,
         _SAMPLES,
         _STEP,
