@@ -45,8 +45,7 @@ from staniel.guidance import (
     pursuit_policy_named,
     safe_loiter,
 )
-from staniel.kernels.footprint import camera_axes, look
-from staniel.tracking import Coverage, Picture, TrackingConfig
+from staniel.tracking import CameraView, Coverage, Picture, TrackingConfig
 
 __all__ = ["Agent", "Briefing"]
 
@@ -237,18 +236,8 @@ class Agent:
             return []
         if camera.delay > 0.0:
             return None
-
-        def shows(places: NDArray[np.float64]) -> NDArray[np.bool_]:
-            eye, points = np.array([pose]), np.empty((len(places), 3))
-            points[:, :2], points[:, 2] = places, camera.target_height
-            axes = camera_axes(eye, np.array([aim]), camera.mounting)
-            walls = self._briefing.chart.walls
-            seen: NDArray[np.bool_] = look(
-                walls, eye, axes, points, camera.half_aperture, camera.range
-            )[0]
-            return seen
-
-        return [Coverage(pose, shows, self._briefing.tracking.detection_probability)]
+        view = CameraView.of(self._briefing.chart, camera, pose, aim)
+        return [Coverage(pose, view, self._briefing.tracking.detection_probability)]
 
     def _allocate(
         self, percept: Percept, tracks: list[TrackEstimate], inbox: Sequence[Message]

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from staniel.city import City
 from staniel.datatypes.belief import Pose, Sighting
+from staniel.datatypes.equipment import Camera
 from staniel.errors import StanielError
-from staniel.tracking import Coverage, Tracker, TrackingConfig
+from staniel.tracking import CameraView, Coverage, Tracker, TrackingConfig
 
 R = 2.25 * np.eye(2)
 WORLD, NOWHERE = shapely.box(-1e4, -1e4, 1e4, 1e4), shapely.box(5e3, 5e3, 6e3, 6e3)
@@ -234,3 +235,24 @@ def test_after_refused_calls_a_good_one_gives_the_bytes_that_it_would_have_given
         for tracker in (tried, plain):
             tracker.step(float(k), sightings, looks)
         assert everything(tried) == everything(plain)
+
+
+# ---------------------------------------------------------------- a camera
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_camera_says_of_all_clouds_at_once_what_it_says_of_each_place(seed):
+    city, rng = City.generate(size=(300.0, 300.0), seed=seed), np.random.default_rng(seed)
+    trackers = [Tracker(rng=seed), Tracker(rng=seed)]
+    places = rng.uniform(50.0, 250.0, (4, 2))
+    for k in range(6):
+        for tracker in trackers:
+            tracker.step(k, [see(k, place) for place in places])
+    assert len(trackers[0].estimates) >= 3
+    for k in range(6, 12):
+        pose = Pose(*rng.uniform(50.0, 250.0, 2), 70.0, rng.uniform(-3.0, 3.0), 0.3, 15.0)
+        view = CameraView.of(city, Camera(), pose, (math.nan, math.nan))
+        looks = [Coverage(pose, view, 0.9)], [Coverage(pose, lambda p, v=view: v(p), 0.9)]
+        for tracker, coverage in zip(trackers, looks, strict=True):
+            tracker.step(k, [see(k, places[0])], coverage)
+        assert everything(trackers[0]) == everything(trackers[1])

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from staniel.errors import StanielError
+from staniel.kernels import looked as kernels
 
 __all__ = ["MOST_BYTES", "QUANTUM", "pack_looked", "unpack_looked"]
 
@@ -33,8 +34,6 @@ MOST_BYTES = 2000
 
 _HEAD = struct.Struct("<BIIII")
 _VERSION = 1
-_NOTHING, _FAR_NOTHING, _OLDEST, _FAR = 255, 254, 253, 256
-_MOST_OF_A_RUN = 255
 
 
 def pack_looked(
@@ -62,37 +61,10 @@ def pack_looked(
     """
     rows, columns = looked.shape
     newest = int(time // QUANTUM)
-    steps = newest - np.floor_divide(looked, QUANTUM).astype(np.int64)
-    codes = np.where((looked >= 0.0) & (steps <= _OLDEST), steps, _NOTHING).reshape(-1)
-    counts = streets.reshape(-1)
-    if first:
-        codes, counts = np.roll(codes, -first), np.roll(counts, -first)
-    # What does not count takes the code of what comes before it.
-    before = np.maximum.accumulate(np.where(counts, np.arange(len(codes)), -1))
-    codes = np.where(before >= 0, codes[before], _NOTHING)
-    starts = np.concatenate(([0], np.flatnonzero(np.diff(codes)) + 1))
-    runs, lengths = _pieces(codes[starts], np.diff(np.append(starts, len(codes))))
-    head = _HEAD.pack(_VERSION, rows, columns, newest, first)
-    room = (MOST_BYTES - _HEAD.size) // 2
-    said = lengths[:room] * np.where(runs[:room] == _FAR_NOTHING, _FAR, 1)
-    rest = 0 if len(runs) <= room else (first + int(said.sum())) % len(codes)
-    return head + np.stack((runs, lengths), axis=1)[:room].astype(np.uint8).tobytes(), rest
-
-
-def _pieces(
-    codes: NDArray[np.int64], lengths: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Runs as codes with lengths that fit in a byte; the last is left out if it says nothing."""
-    if codes[-1] == _NOTHING:
-        codes, lengths = codes[:-1], lengths[:-1]
-    far = np.where(codes == _NOTHING, lengths // _FAR, 0)
-    kinds = np.stack((np.full_like(codes, _FAR_NOTHING), codes), axis=1).reshape(-1)
-    amounts = np.stack((far, lengths - _FAR * far), axis=1).reshape(-1)
-    pieces = -(-amounts // _MOST_OF_A_RUN)
-    full = np.full(pieces.sum(), _MOST_OF_A_RUN)
-    some = pieces > 0
-    full[np.cumsum(pieces)[some] - 1] = (amounts - _MOST_OF_A_RUN * (pieces - 1))[some]
-    return np.repeat(kinds, pieces), full
+    runs = np.empty(((MOST_BYTES - _HEAD.size) // 2, 2), np.uint8)
+    count, said = kernels.said(looked, streets, newest, QUANTUM, first, runs)
+    rest = 0 if said == looked.size else (first + said) % looked.size
+    return _HEAD.pack(_VERSION, rows, columns, newest, first) + runs[:count].tobytes(), rest
 
 
 def unpack_looked(cells: bytes, shape: tuple[int, int], time: float) -> NDArray[np.float64]:
@@ -128,17 +100,15 @@ def unpack_looked(cells: bytes, shape: tuple[int, int], time: float) -> NDArray[
         raise StanielError(f"cells: a map of {rows} x {columns}: expected {shape[0]} x {shape[1]}")
     if newest * QUANTUM > time:
         raise StanielError(f"cells: looked at {newest * QUANTUM:g} s: expected not after {time:g}")
-    runs = np.frombuffer(cells, dtype=np.uint8, offset=_HEAD.size).reshape(-1, 2).astype(np.int64)
-    codes, lengths = runs[:, 0], runs[:, 1].copy()
-    lengths[codes == _FAR_NOTHING] *= _FAR
+    runs = np.frombuffer(cells, dtype=np.uint8, offset=_HEAD.size).reshape(-1, 2)
     total = rows * columns
-    if first >= total or lengths.sum() > total or not (lengths > 0).all():
-        raise StanielError(
-            f"cells: runs over {lengths.sum()} cells from {first}: there are {total}"
-        )
-    times = np.where(codes <= _OLDEST, (newest - codes) * QUANTUM, -np.inf)
-    if (times[codes <= _OLDEST] < 0.0).any():
-        raise StanielError("cells: looked at before the start: expected 0 s or later")
     told = np.full(total, -np.inf)
-    told[: lengths.sum()] = np.repeat(times, lengths)
-    return np.roll(told, first).reshape(shape)
+    found = kernels.TOO_LONG
+    if first < total:
+        found = kernels.told(runs, newest, QUANTUM, first, told)
+    if found == kernels.TOO_LONG:
+        long = int((runs[:, 1] * np.where(runs[:, 0] == kernels.FAR_NOTHING, kernels.FAR, 1)).sum())
+        raise StanielError(f"cells: runs over {long} cells from {first}: there are {total}")
+    if found == kernels.BEFORE_START:
+        raise StanielError("cells: looked at before the start: expected 0 s or later")
+    return told.reshape(shape)

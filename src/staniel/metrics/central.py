@@ -3,20 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from staniel.city import City
-from staniel.datatypes.belief import Sighting
-from staniel.datatypes.equipment import Camera
+from staniel.datatypes.belief import Pose, Sighting
 from staniel.datatypes.truth import FLYING
-from staniel.kernels.footprint import camera_axes, look
 from staniel.record import TRACK_DTYPE, Record
-from staniel.tracking import Coverage, Tracker, TrackingConfig
-from staniel.tracking.coverage import Shows
+from staniel.tracking import CameraView, Coverage, Tracker, TrackingConfig
 
 __all__ = ["central_fusion"]
-
-Floats = NDArray[np.float64]
 
 GROUND = -1
 """Agent number of a ground station."""
@@ -63,7 +56,9 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
         looks = [
             Coverage(
                 None,
-                _view(chart, cameras[i], record.aircraft[k, i], aims[k, i]),
+                CameraView.of(
+                    chart, cameras[i], Pose(*record.aircraft[k, i].tolist()), aims[k, i].tolist()
+                ),
                 config.detection_probability,
             )
             for i in np.flatnonzero(flying[k]).tolist()
@@ -87,17 +82,3 @@ def central_fusion(record: Record, config: TrackingConfig | None = None) -> Reco
                 )
             )  # fmt: skip
     return replace(record, tracks=np.array(tracks, dtype=TRACK_DTYPE))
-
-
-def _view(city: City, camera: Camera, pose: Floats, aim: Floats) -> Shows:
-    """Which places a camera in `pose` sees, a gimballed one led to `aim`."""
-
-    def shows(places: Floats) -> NDArray[np.bool_]:
-        points = np.column_stack((places, np.full(len(places), camera.target_height)))
-        axes = camera_axes(pose[None], aim[None], camera.mounting)
-        seen: NDArray[np.bool_] = look(
-            city.walls, pose[None], axes, points, camera.half_aperture, camera.range
-        )[0]
-        return seen
-
-    return shows

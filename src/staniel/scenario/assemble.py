@@ -147,6 +147,7 @@ def kernels_of(scenario: Scenario) -> list[str]:
     """Kernel modules that this scenario calls beside those that every mission does."""
     dangerous = bool(scenario.risk.regions or scenario.risk.carried.radius)
     uses = {
+        "auction": scenario.cooperation.mode != "none",
         "gusts": scenario.wind.gusts,
         "occupancy": scenario.guidance.avoidance == "predictive",
         "avoidance": scenario.guidance.avoidance == "predictive",

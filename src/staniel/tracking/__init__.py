@@ -2,8 +2,8 @@
 
 from staniel.tracking.aliases import Aliases
 from staniel.tracking.config import TrackingConfig
-from staniel.tracking.coverage import Coverage
+from staniel.tracking.coverage import CameraView, Coverage
 from staniel.tracking.picture import Picture
 from staniel.tracking.tracker import Tracker
 
-__all__ = ["Aliases", "Coverage", "Picture", "Tracker", "TrackingConfig"]
+__all__ = ["Aliases", "CameraView", "Coverage", "Picture", "Tracker", "TrackingConfig"]

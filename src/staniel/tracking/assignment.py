@@ -17,6 +17,7 @@ Bools = NDArray[np.bool_]
 FREE = -1
 """Owner of a sighting that is nobody's."""
 
+_SMALL = 1000  # entries of a matrix that costs less than finding the knots in it
 _ROUNDS = 30  # of belief propagation
 _EVEN = 0.5  # a sighting is the track's that more likely than not caused it
 
@@ -87,31 +88,39 @@ def _nearest(
 def _best(pairs: Ints, gains: Floats) -> Ints:
     """Numbers of the pairs, one a track and one a sighting at most, of the greatest sum of gains.
 
-    Tracks and sightings that no pair connects are decided apart: a matrix is never larger than a
-    knot of tracks that contest one another's sightings.
+    Where there are many, tracks and sightings that no pair connects are decided apart: a matrix is
+    then no larger than a knot of tracks that contest one another's sightings.
     """
-    from scipy.optimize import linear_sum_assignment
+    tracks, rows = np.unique(pairs[:, 0], return_inverse=True)
+    sightings, columns = np.unique(pairs[:, 1], return_inverse=True)
+    if tracks.size * sightings.size <= _SMALL:
+        return _matched(rows, columns, gains)
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    tracks, rows = np.unique(pairs[:, 0], return_inverse=True)
-    sightings, columns = np.unique(pairs[:, 1], return_inverse=True)
     size = tracks.size + sightings.size
     links = coo_array((np.ones(len(pairs)), (rows, tracks.size + columns)), shape=(size, size))
     _, knot = connected_components(links, directed=False)
     chosen = []
     for label in np.unique(knot[rows]).tolist():
         own = np.flatnonzero(knot[rows] == label)
-        if own.size == 1:
-            chosen.append(int(own[0]))
-            continue
-        a, row = np.unique(rows[own], return_inverse=True)
-        b, column = np.unique(columns[own], return_inverse=True)
-        gain = np.zeros((a.size, b.size))
-        number = np.full((a.size, b.size), -1)
-        gain[row, column], number[row, column] = gains[own], own
-        chosen += [n for n in number[linear_sum_assignment(-gain)].tolist() if n >= 0]
-    return np.array(chosen, np.int64)
+        _, row = np.unique(rows[own], return_inverse=True)
+        _, column = np.unique(columns[own], return_inverse=True)
+        chosen.append(own[_matched(row, column, gains[own])])
+    return np.concatenate(chosen)
+
+
+def _matched(rows: Ints, columns: Ints, gains: Floats) -> Ints:
+    """As `_best`, by one matrix that has a row and a column of every number up to the greatest."""
+    from scipy.optimize import linear_sum_assignment
+
+    if rows.size == 1:
+        return np.zeros(1, np.int64)
+    shape = int(rows.max()) + 1, int(columns.max()) + 1
+    cost, number = np.zeros(shape), np.full(shape, -1)
+    cost[rows, columns], number[rows, columns] = -gains, np.arange(rows.size)
+    chosen: Ints = number[linear_sum_assignment(cost)]
+    return chosen[chosen >= 0]
 
 
 def _likeliest(

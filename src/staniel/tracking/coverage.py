@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from numbers import Real
 from typing import Any, NamedTuple
 
@@ -11,15 +12,70 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from staniel.city import City
 from staniel.datatypes.belief import Pose
+from staniel.datatypes.equipment import Camera
 from staniel.errors import StanielError
+from staniel.kernels import footprint, misses
 
-__all__ = ["Coverage", "checked_coverage"]
+__all__ = ["CameraView", "Coverage", "checked_coverage"]
 
 Places = NDArray[np.float64]
 Shows = Callable[[Places], NDArray[np.bool_]]
 
 _CLOCK_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class CameraView:
+    """What a camera has in view of the ground, as far as a chart knows what hides it.
+
+    Attributes
+    ----------
+    chart : City
+    camera : Camera
+    pose : Pose
+        The aircraft's.
+    axis : (1, 3) float array
+        Along which the camera looks.
+    """
+
+    chart: City
+    camera: Camera
+    pose: Pose
+    axis: Places
+
+    @classmethod
+    def of(cls, chart: City, camera: Camera, pose: Pose, aim: tuple[float, float]) -> "CameraView":
+        """View from a pose; `aim` is where a gimbal looks [m], NaN for straight down."""
+        eye, point = np.array([pose], np.float64), np.array([aim], np.float64)
+        return cls(chart, camera, pose, footprint.camera_axes(eye, point, camera.mounting))
+
+    def __call__(self, places: Places) -> NDArray[np.bool_]:
+        """Which of (n, 2) places it has in view."""
+        camera, points = self.camera, np.empty((len(places), 3))
+        points[:, :2], points[:, 2] = places, camera.target_height
+        eye, walls = np.array([self.pose], np.float64), self.chart.walls
+        seen: NDArray[np.bool_] = footprint.look(
+            walls, eye, self.axis, points, camera.half_aperture, camera.range
+        )[0]
+        return seen
+
+    def discount(
+        self,
+        state: NDArray[np.float32],
+        origins: Places,
+        log_weights: NDArray[np.float32],
+        missed: NDArray[np.int64],
+        loss: float,
+    ) -> None:
+        """As calling it with all particles of the clouds in `staniel.tracking.bank.Bank`."""
+        camera = self.camera
+        misses.discount(
+            self.chart.walls, np.array(self.pose[:3], np.float64), self.axis[0],
+            camera.target_height, camera.half_aperture, camera.range, state, origins, log_weights,
+            missed, np.float32(loss),
+        )  # fmt: skip
 
 
 class Coverage(NamedTuple):
@@ -92,6 +148,8 @@ def _checked(name: str, given: Any, now: float) -> Coverage:  # noqa: ANN401 - u
                 f"{shapely.is_valid_reason(visible)}"
             )
         shapely.prepare(visible)
+    elif isinstance(visible, CameraView):
+        return look
     elif callable(visible):
         _probe(name, visible)
     else:

@@ -16,7 +16,7 @@ from staniel.kernels.random import fold
 from staniel.tracking.assignment import FREE, assign
 from staniel.tracking.bank import Bank
 from staniel.tracking.config import TrackingConfig
-from staniel.tracking.coverage import Coverage, checked_coverage
+from staniel.tracking.coverage import CameraView, Coverage, checked_coverage
 from staniel.tracking.doubles import Doubles, dispersion
 from staniel.tracking.intake import Batch, Intake, Key
 from staniel.tracking.memory import Memory, gain_of
@@ -209,11 +209,15 @@ class Tracker:
 
     def _miss_in_view(self, looks: list[Coverage], hits: Ints, now: float) -> None:
         """Take weight from the particles of unseen tracks that a look would have shown."""
-        bank = self._bank
-        for k in np.flatnonzero(hits == 0).tolist():
-            for look in looks:
-                shown = look.shows(bank.places(k, now if look.time is None else look.time, now))
-                bank.log_weights[k][shown] += math.log1p(-look.detection_probability)
+        bank, missed = self._bank, np.flatnonzero(hits == 0)
+        for look in looks:
+            loss, time = math.log1p(-look.detection_probability), look.time
+            if isinstance(look.visible, CameraView) and time is None:
+                look.visible.discount(bank.state, bank.origins, bank.log_weights, missed, loss)
+                continue
+            for k in missed.tolist():
+                shown = look.shows(bank.places(k, now if time is None else time, now))
+                bank.log_weights[k][shown] += loss
 
     def particles(self, track: TrackId) -> Floats:
         """Copy of a track's particles, weights apart.
