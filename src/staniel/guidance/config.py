@@ -16,7 +16,7 @@ class LookaheadConfig(Config):
 
     horizon: int = Field(18, ge=2, le=60, description="how far ahead flights are looked at [s]")
     banks: int = Field(5, ge=3, le=15, description="different banks, evenly from limit to limit")
-    width: int = Field(40, ge=1, le=5000, description="flights kept after each second")
+    width: int = Field(24, ge=1, le=5000, description="flights kept after each second")
     polish: int = Field(2, ge=0, le=10, description="times that the best are gone through")
     particles: int = Field(16, ge=1, le=200, description="places that stand for the belief")
     discount: float = Field(0.95, gt=0.0, le=1.0, description="worth of sight a second later")

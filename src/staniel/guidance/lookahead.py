@@ -21,7 +21,7 @@ from staniel.datatypes.risk import RiskRegion, region_arrays
 from staniel.guidance.config import LookaheadConfig
 from staniel.guidance.pursuit import NoFeasibleFlightError, Partner, Pursuit, pursuit_policy
 from staniel.kernels.flight import MAX_BANKS
-from staniel.kernels.forecast import discredit, forecast
+from staniel.kernels.forecast import discredit, forecast, thinned
 from staniel.kernels.lookahead import plan
 from staniel.kernels.lookout import Eye, roll_out, shade
 from staniel.kernels.moves import new_moves
@@ -89,7 +89,8 @@ def lookahead(pursuit: Pursuit) -> FlyBanks:
         raise NoFeasibleFlightError(f"no flight of {config.horizon} s is free from {pursuit.pose}")
     memory.sequence, memory.planned = sequence, pursuit.time
     held = tuple(sequence[:MAX_BANKS].tolist())
-    east, north = places[1 : _SAMPLES + 1].mean(axis=(0, 1)).tolist()
+    soon = places[1 : _SAMPLES + 1].reshape(-1, 2)
+    east, north = (soon.sum(axis=0) / len(soon)).tolist()
     return FlyBanks(held, _HOLD, airframe.speed, airframe.altitude, (east, north))
 
 
@@ -181,10 +182,8 @@ def _thinned(pursuit: Pursuit, memory: _Memory) -> Floats:
         camera.range,
         _MISS,
     )
-    count = pursuit.config.lookahead.particles
-    sums = np.cumsum(weights)
-    picks = np.searchsorted(sums, (np.arange(count) + 0.5) / count * sums[-1])
-    return np.ascontiguousarray(particles[np.minimum(picks, len(particles) - 1)])
+    few: Floats = thinned(particles, weights, pursuit.config.lookahead.particles)
+    return few
 
 
 def _look_of(partner: Partner, camera: Camera) -> tuple[float, float] | None:

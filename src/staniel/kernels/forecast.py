@@ -11,9 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.footprint import BODY, Mount, camera_axes, in_cone
+from staniel.kernels.pieces import bare, woven
 from staniel.kernels.walls import Walls, inside, line_of_sight, path_clear, warm_walls
 
-__all__ = ["discredit", "forecast", "warm"]
+__all__ = ["discredit", "forecast", "thinned", "warm"]
 
 Floats = NDArray[np.float64]
 
@@ -24,14 +25,14 @@ _ASIDE = 3.0  # room that a blocked vehicle wants on the side to which it turns 
 _STANDING = 0.05  # a slower particle stays where it is [m/s]
 
 
-@njit(cache=True, error_model="numpy")
+@woven
 def _clear(walls: Walls, x: float, y: float, angle: float, length: float) -> bool:
     """Whether no wall is within `length` of (x, y) in the direction `angle`."""
     there_x, there_y = x + length * math.cos(angle), y + length * math.sin(angle)
     return bool(path_clear(walls, x, y, there_x, there_y))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _drive(walls: Walls, particle: Floats, dt: float, turning: float, tie: float) -> float:
     """Move one vehicle (x, y, heading, speed) by `dt`, in place.
 
@@ -159,8 +160,22 @@ def discredit(
         weights[:] = left / total
 
 
+@njit(cache=True, error_model="numpy")
+def thinned(cloud: Floats, weights: Floats, count: int) -> Floats:
+    """(count, 4) particles of equal weight that stand for the cloud, evenly by its weights."""
+    picked = np.empty((count, cloud.shape[1]))
+    total, before, i = weights.sum(), weights[0], 0
+    for k in range(count):
+        wanted = (k + 0.5) / count * total
+        while before < wanted and i < cloud.shape[0] - 1:
+            i += 1
+            before += weights[i]
+        picked[k] = cloud[i]
+    return picked
+
+
 def warm() -> None:
     """Compile, or load from the disk cache, what a flight calls."""
     walls, cloud = warm_walls(), np.zeros((1, 4))
-    forecast(walls, cloud, 1, 0.5)
+    forecast(walls, thinned(cloud, np.ones(1), 1), 1, 0.5)
     discredit(walls, cloud, np.ones(1), 0.0, np.zeros((1, 8)), BODY, 1.0, 1.0, 1.0, 0.1)

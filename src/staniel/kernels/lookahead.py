@@ -16,7 +16,7 @@ from staniel.kernels.footprint import BODY
 from staniel.kernels.lookout import Eye, flies_low, no_regions
 from staniel.kernels.moves import entry_of, nearest, new_moves
 from staniel.kernels.outlook import Outlook, free_shares, new_outlook, outlook
-from staniel.kernels.pieces import woven
+from staniel.kernels.pieces import bare, woven
 from staniel.kernels.risk import Regions
 from staniel.kernels.scene import Scene, Search, ended, gained, merged
 from staniel.kernels.sightlines import Sightlines, new_sightlines
@@ -31,7 +31,7 @@ _TWO_PI = 2.0 * math.pi
 _SAME_PLACE, _SAME_HEADING, _SAME_BANK = 12.0, 0.5, 0.2  # within these two states are one
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _key(x: float, y: float, heading: float, bank: float) -> int:
     """Number that states have in common which are nearly the same."""
     turned = heading - _TWO_PI * math.floor(heading / _TWO_PI)
@@ -41,7 +41,7 @@ def _key(x: float, y: float, heading: float, bank: float) -> int:
     return (key << 2) + (0 if bank < -_SAME_BANK else (2 if bank > _SAME_BANK else 1))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _entry(table: Indices, keys: Indices, key: int) -> int:
     """Where a key is in an open hash table, or would be; -1 in `table` is an empty entry."""
     mask = table.size - 1
@@ -51,14 +51,14 @@ def _entry(table: Indices, keys: Indices, key: int) -> int:
     return at
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _begin(start: Floats, rows: Floats) -> None:
     """Fill the first row from a pose."""
     rows[0, 0], rows[0, 1], rows[0, 2] = start[0], start[1], start[3]
     rows[0, 3], rows[0, 4] = start[4], 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _swing(eye: Eye) -> tuple[float, float]:
     """Cosine and sine of the limit of a gimbal."""
     return math.cos(eye.mount[5]), math.sin(eye.mount[5])
@@ -74,7 +74,7 @@ def _hoped(
     return float(outlook(beyond, ahead, left, bank))
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _flown(scene: Scene, sequence: Indices, rows: Floats, level: int, least: float) -> float:
     """Worth of a whole sequence of banks and its outlook; -inf unless it is above `least`.
 
@@ -136,7 +136,7 @@ def _polished(scene: Scene, sequence: Indices) -> float:
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _raised(best: Indices, ranks: Floats, at: int) -> None:
     """Move the entry `at` of `best` up to where it belongs by its rank, in place."""
     g = best[at]
@@ -146,7 +146,7 @@ def _raised(best: Indices, ranks: Floats, at: int) -> None:
     best[at] = g
 
 
-@njit(cache=True, error_model="numpy")
+@bare
 def _grown(
     scene: Scene,
     first: int,
