@@ -30,7 +30,7 @@ class Scripted(Bus):
 def hold(bus, agents, target=0):
     """Let some agents hold a target, each by its own name, as after a partition."""
     for agent in agents:
-        bus.sides[agent]._hold(bus.names[agent, target], bus.targets[target])
+        bus.sides[agent]._ledger.hold(bus.names[agent, target], bus.targets[target])
 
 
 def links(count):
@@ -80,7 +80,7 @@ def test_crossing_costs_do_not_make_both_yield(lost, data):
         bus.targets[0] = (data.draw(st.floats(20.0, 380.0)), 0.0)
         for side in bus.sides:
             if side.holding is not None:
-                side._follow_holding()
+                side._ledger.follow_holding()
         bus.tick()
         assert bus.holders(0)
 

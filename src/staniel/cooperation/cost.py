@@ -15,7 +15,7 @@ from staniel.datatypes.equipment import Airframe, Camera
 from staniel.datatypes.message import COST_TERMS, Point
 from staniel.kernels.dubins import shortest
 
-__all__ = ["CostModel", "Goal", "Price", "Situation"]
+__all__ = ["CostModel", "Goal", "Price", "Prices", "Situation"]
 
 Floats = NDArray[np.float64]
 
@@ -42,6 +42,10 @@ class Price(NamedTuple):
 
     cost: float
     terms: tuple[float, ...] = ()
+
+
+Prices = Callable[[Sequence[Goal]], list[Price]]
+"""What some goals cost an agent, one price each, as `CostModel.prices` of a situation."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from staniel.cooperation.cost import Goal, Price
 from staniel.datatypes.belief import TrackId
-from staniel.datatypes.message import Point, Release, Unheld
+from staniel.datatypes.message import Award, Point, Release, Unheld
 
-__all__ = ["Holding", "Lease", "Task", "UnheldTable"]
+__all__ = ["Auction", "Holding", "Lease", "Task", "UnheldTable"]
 
 TOLD = 8
 """Unheld targets that a heartbeat tells of at most."""
@@ -42,6 +43,16 @@ class Task:
     velocity: Point = (0.0, 0.0)
     last_seen: float = 0.0
 
+    @property
+    def goal(self) -> Goal:
+        """Where it is and how it drives, as others price it."""
+        return Goal(self.position, self.course, math.hypot(*self.velocity))
+
+    @property
+    def price(self) -> Price:
+        """What it costs the agent, with the terms of that."""
+        return Price(self.cost, self.terms)
+
 
 @dataclass(frozen=True, slots=True)
 class Holding:
@@ -60,6 +71,19 @@ class Lease:
     target: TrackId
     cost: float
     said: float
+
+
+@dataclass(slots=True)
+class Auction:
+    """An auction that the agent itself opened; once awarded it waits for the winner's word."""
+
+    goal: Goal
+    price: Price  # the agent's own
+    closes: float
+    holder: int | None = None  # who held the target when it was opened
+    declined: set[int] = field(default_factory=set)
+    award: Award | None = None
+    tries: int = 0
 
 
 @dataclass(frozen=True, slots=True)

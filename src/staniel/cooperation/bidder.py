@@ -1,0 +1,115 @@
+"""What an agent answers to the auctions of others: it revokes, consents, or bids."""
+
+import numpy as np
+
+from staniel.cooperation.cost import Goal, Price, Prices
+from staniel.cooperation.ledger import Ledger
+from staniel.datatypes.belief import TrackId
+from staniel.datatypes.message import Announce, Bid, Handover, Revoke
+
+__all__ = ["Bidder"]
+
+
+class Bidder:
+    """The agent in the auctions of others.
+
+    Parameters
+    ----------
+    ledger : Ledger
+    """
+
+    def __init__(self, ledger: Ledger) -> None:
+        self._ledger = ledger
+
+    def answer(self, announced: list[Announce], prices: Prices) -> None:
+        """Answer all that was announced since the last step, with one bid for what is wanted.
+
+        Parameters
+        ----------
+        announced : list of Announce
+            It is sorted in place.
+        prices : callable
+        """
+        ledger = self._ledger
+        announced.sort(key=lambda message: (message.target, message.sender))
+        wanted: list[Announce] = []
+        for message in _first_names(announced, ledger.config.same_target):
+            if self._is_for_bids(message):
+                wanted.append(message)
+                ledger.elsewhere[message.target] = message, ledger.time + ledger.bid_time
+        if wanted and ledger.able:
+            self._bid(wanted, prices)
+
+    def _bid(self, wanted: list[Announce], prices: Prices) -> None:
+        ledger, joint = self._ledger, self._ledger.config.award == "joint"
+        offers = []
+        goals = [Goal(m.position, m.course, m.speed) for m in wanted]
+        for message, price in zip(wanted, prices(goals), strict=True):
+            price = self._with_handover(price, message.target)
+            if joint or price.cost <= message.cost:
+                offers.append((message.target, message.sender, price))
+        if offers and joint:
+            offers += [
+                (name, ledger.agent, task.price)
+                for name, auction in ledger.auctions.items()
+                if auction.award is None and (task := ledger.tasks.get(name)) is not None
+            ]
+            offers.sort(key=lambda offer: offer[:2])
+        if offers:
+            targets, auctioneers, costs = zip(*offers, strict=True)
+            ledger.say(
+                Bid,
+                targets=targets,
+                auctioneers=auctioneers,
+                costs=tuple(price.cost for price in costs),
+                terms=tuple(p.terms for p in costs) if any(p.terms for p in costs) else (),
+            )
+            ledger.bids.append((ledger.time, ledger.outbox[-1]))  # type: ignore[arg-type]
+
+    def _is_for_bids(self, message: Announce) -> bool:
+        """Whether another's auction stands, for all that the agent knows."""
+        ledger, target = self._ledger, message.target
+        own = ledger.own_name(target, message.position)
+        holding = ledger.holding
+        # Whatever comes of it, this target needs no second auction before this one is over.
+        until = ledger.time + 2.0 * ledger.bid_time
+        ledger.paused[target] = max(ledger.paused.get(target, 0.0), until)
+        if holding is not None and holding.id in (target, own):
+            cost = ledger.cost
+            stands = message.cost + ledger.config.handover_margin < cost
+            ledger.say(
+                Handover if stands else Revoke,
+                target=target,
+                auctioneer=message.sender,
+                held_as=holding.id,
+                position=holding.position,
+                cost=cost,
+            )
+            return False
+        if own is not None and own in ledger.auctions:
+            if (own, ledger.agent) < (target, message.sender):
+                return False  # The auction of the older name goes on; the other hears of it too.
+            del ledger.auctions[own]
+        if own is not None and target < own:
+            ledger.rename(own, target)
+        return True
+
+    def _with_handover(self, price: Price, target: TrackId) -> Price:
+        """The price of a target that another holds is higher by the hand-over margin."""
+        margin = self._ledger.config.handover_margin
+        if all(lease.target != target for lease in self._ledger.leases.values()):
+            return price
+        terms = list(price.terms)
+        if terms:
+            terms[6] = margin
+        return Price(price.cost + margin, tuple(terms))
+
+
+def _first_names(announced: list[Announce], near: float) -> list[Announce]:
+    """Without those at whose place another one is announced under an older name."""
+    if len(announced) < 2:
+        return announced
+    places = np.array([message.position for message in announced])
+    apart = places[:, None, :] - places
+    again = np.tril((apart * apart).sum(axis=2) <= near * near, -1).any(axis=1).tolist()
+    return [message for message, twice in zip(announced, again, strict=True) if not twice]

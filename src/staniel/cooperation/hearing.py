@@ -1,0 +1,192 @@
+"""What an agent makes of what it hears: leases, names, awards, and who leads."""
+
+import math
+from collections.abc import Sequence
+
+from staniel.cooperation.ledger import Ledger
+from staniel.cooperation.table import Lease
+from staniel.datatypes.belief import TrackId
+from staniel.datatypes.message import (
+    Acknowledge,
+    Award,
+    Beacon,
+    Bid,
+    Handover,
+    Heartbeat,
+    Message,
+    Point,
+    Release,
+    Revoke,
+    Unheld,
+)
+
+__all__ = ["Hearing"]
+
+
+class Hearing:
+    """The agent as hearer.
+
+    Parameters
+    ----------
+    ledger : Ledger
+        Into which goes what is heard.
+    centre : int or None
+        Id of the ground station whose awards are orders, where there is one.
+    """
+
+    def __init__(self, ledger: Ledger, centre: int | None) -> None:
+        self._ledger, self._centre = ledger, centre
+        self._told: dict[int, int] = {}
+        self._led_at = -math.inf
+
+    @property
+    def led(self) -> bool:
+        """Whether the ground station shares the targets out: it was heard within a lease."""
+        ledger = self._ledger
+        return self._centre is not None and ledger.time - self._led_at <= ledger.config.lease
+
+    def hear(self, messages: Sequence[Message]) -> None:
+        """Take in what arrived, then the awards to the agent itself, of which it takes the best."""
+        for message in messages:
+            self._hear(message)
+        agent = self._ledger.agent
+        self._take([m for m in messages if isinstance(m, Award) and m.winner == agent])
+
+    def _hear(self, message: Message) -> None:
+        match message:
+            case Heartbeat():
+                self._hear_heartbeat(message)
+            case Beacon() if message.sender == self._centre:
+                self._led_at = message.time
+            case Bid():
+                self._ledger.bids.append((self._ledger.time, message))
+            case Award():
+                self._hear_award(message)
+            case Acknowledge(target=target, sender=sender):
+                self._settle(target, sender)
+            case Revoke():
+                self._hear_revoke(message)
+            case Handover():
+                auctions = self._ledger.auctions
+                if message.auctioneer == self._ledger.agent and message.target in auctions:
+                    auctions[message.target].holder = message.sender
+                    self._lease(message, message.held_as, message.cost)
+            case Release():
+                self._hear_release(message)
+
+    def _hear_heartbeat(self, message: Heartbeat) -> None:
+        ledger = self._ledger
+        target, sender, position = message.target, message.sender, message.target_position
+        # What the sender said of itself since then, and was heard first, is the news.
+        if message.sequence < self._told.get(sender, 0):
+            return
+        self._told[sender] = message.sequence
+        ledger.beats[sender] = message
+        if message.unheld:
+            self._correct(ledger.unheld.hear(message.unheld, ledger.time))
+        if target is None or position is None:
+            lease = ledger.leases.get(sender)
+            # Who says nothing of an award after it was made did not hear it.
+            if lease is not None and message.time > lease.said:
+                del ledger.leases[sender]
+            return
+        self._lease(message, target, message.cost)
+        place = _moved(message, position, ledger.time)
+        ledger.uncross(target, place)
+        own = ledger.own_name(target, place)
+        self._settle(target, sender)
+        if ledger.holding is not None and ledger.holding.id in (target, own):
+            # Both as of the same instant: never do both yield.
+            mine = ledger.said.get(message.time, -math.inf)
+            since = ledger.holding.since
+            if message.time < since or (message.cost, -sender) > (mine, -ledger.agent):
+                return  # The other one yields when it hears our heartbeat.
+            ledger.holding = None
+        ledger.rename(own, target)
+
+    def _correct(self, wrong: list[Unheld]) -> None:
+        """Tell who still counts a target as unheld that was looked for, or is known otherwise."""
+        ledger = self._ledger
+        for unheld in wrong:
+            if unheld.target not in ledger.paused:
+                ledger.paused[unheld.target] = ledger.time + 2.0 * ledger.bid_time
+                ledger.say(
+                    Release,
+                    target=unheld.target,
+                    position=unheld.position,
+                    lost=True,
+                    seen=unheld.seen,
+                )
+
+    def _hear_award(self, message: Award) -> None:
+        ledger, target, winner = self._ledger, message.target, message.winner
+        if winner == ledger.agent:
+            return  # See `_take`.
+        ledger.auctions.pop(target, None)
+        self._lease(message, target, message.cost, winner)
+        if message.sender == self._centre and ledger.holding is not None:
+            own = ledger.own_name(target, message.position)
+            if ledger.holding.id in (target, own):
+                ledger.holding = None
+
+    def _take(self, awards: list[Award]) -> None:
+        """Take the best of what was awarded, acknowledge it and decline the rest."""
+        ledger, wanted = self._ledger, None
+        for award in sorted(awards, key=lambda award: (award.cost, award.target)):
+            ordered = award.sender == self._centre
+            held = ledger.holding is not None and ledger.holding.id == award.target
+            if held or (wanted is None and (ordered or ledger.free) and ledger.health != "blind"):
+                if not held:
+                    ledger.rename(ledger.own_name(award.target, award.position), award.target)
+                    if ledger.holding is not None and ledger.holding.id != award.target:
+                        ledger.let_go()
+                    ledger.hold(award.target, award.position)
+                wanted = award.target
+                ledger.say(Acknowledge, target=award.target, auctioneer=award.sender)
+            else:
+                ledger.say(Release, target=award.target, position=award.position, lost=False)
+
+    def _hear_revoke(self, message: Revoke) -> None:
+        ledger = self._ledger
+        if message.auctioneer == ledger.agent:
+            ledger.auctions.pop(message.target, None)
+            self._lease(message, message.held_as, message.cost)
+            ledger.rename(message.target, message.held_as)
+
+    def _hear_release(self, message: Release) -> None:
+        ledger, target, sender = self._ledger, message.target, message.sender
+        self._told[sender] = max(self._told.get(sender, 0), message.sequence)
+        lease = ledger.leases.get(sender)
+        # A heartbeat that was said later may have come before it.
+        if lease is not None and lease.target == target and lease.said <= message.time:
+            del ledger.leases[sender]
+        ledger.unheld.hear_release(message, ledger.time)
+        auction = ledger.auctions.get(target)
+        if auction is not None and auction.award is not None and auction.award.winner == sender:
+            # It was awarded something better: to the next.
+            auction.declined.add(sender)
+            auction.award, auction.closes, auction.tries = None, ledger.time, 0
+
+    def _settle(self, target: TrackId, holder: int) -> None:
+        """Somebody says that he holds a target: an own auction of it is over.
+
+        But for the one that is to take the target from him.
+        """
+        auction = self._ledger.auctions.get(target)
+        if auction is not None and auction.holder != holder:
+            del self._ledger.auctions[target]
+
+    def _lease(
+        self, message: Message, target: TrackId, cost: float, holder: int | None = None
+    ) -> None:
+        ledger, holder = self._ledger, message.sender if holder is None else holder
+        known = ledger.leases.get(holder)
+        if known is None or known.said <= message.time:
+            ledger.leases[holder] = Lease(target, cost, message.time)
+            ledger.unheld.drop((target,))
+
+
+def _moved(message: Heartbeat, position: Point, time: float) -> Point:
+    """Where the target of a heartbeat is by now, if it kept its velocity."""
+    (x, y), (vx, vy), late = position, message.target_velocity, time - message.time
+    return x + vx * late, y + vy * late
