@@ -15,7 +15,7 @@ fly: $(READY)   ## fly the default mission and draw its movie
 	$(BIN)/staniel fly --movie
 
 test: lint   ## run the checks, then the tests
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(READY)   ## run the checks alone: style, types, import contracts
 	$(BIN)/ruff check .
