@@ -34,6 +34,7 @@ class Bus:
         self.dead, self.log, self.time = set(), [], 0.0
         self.health, self.alone = {}, set()
         self.trackers = {}  # of each target; not told: all
+        self.offsets = {}  # of an agent's instants within the second
 
     def cost(self, agent, target):
         pose, (x, y) = self.poses[agent], self.targets[target]
@@ -69,7 +70,7 @@ class Bus:
                 if agent in self.trackers.get(k, range(len(self.sides)))
             ]
             out = side.step(
-                self.time,
+                self.time + self.offsets.get(agent, 0.0),
                 self.poses[agent],
                 tasks,
                 self.inboxes[agent],

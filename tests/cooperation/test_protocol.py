@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from staniel.cooperation import CooperationConfig
 from staniel.datatypes.belief import TrackId
-from staniel.datatypes.message import Acknowledge, Award, Handover, Release, Revoke
+from staniel.datatypes.message import Acknowledge, Announce, Award, Handover, Release, Revoke
 from team_bus import Bus
 
 SETTLED = 8  # ticks: a heartbeat each way, or an auction where both had let go
@@ -83,6 +83,23 @@ def test_crossing_costs_do_not_make_both_yield(lost, data):
                 side._ledger.follow_holding()
         bus.tick()
         assert bus.holders(0)
+
+
+@given(
+    st.lists(st.sets(st.sampled_from(links(2))), max_size=4),
+    st.floats(0.01, 0.99),
+    st.sampled_from([0, 1]),
+    st.floats(20.0, 380.0),
+)
+@settings(max_examples=100, deadline=None)
+def test_holders_that_never_speak_at_one_instant_become_one(lost, offset, late, place):
+    bus = Scripted([(0, 0, 0.0), (400, 0, math.pi)], [(place, 0.0)], dict(enumerate(lost, 1)))
+    bus.offsets[late] = offset
+    hold(bus, (0, 1))
+    for _ in range(4 + SETTLED):
+        bus.tick()
+        assert bus.holders(0)
+    assert len(bus.holders(0)) == 1
 
 
 def test_a_handover_leaves_no_gap():
@@ -219,3 +236,32 @@ def test_names_that_a_holder_uses_the_other_way_round_are_exchanged():
     assert bus.names[1, 1] == bus.names[0, 1]
     bus.run(8)
     assert [bus.holders(0), bus.holders(1)] in ([[0], [1]], [[1], [0]])
+
+
+def test_exchanged_names_take_their_trails_along_and_end_auctions_at_the_wrong_place():
+    one, two = TrackId(0.0, 0, 1), TrackId(0.0, 0, 2)
+    names = {(0, 0): one, (0, 1): two, (1, 0): two, (1, 1): one}
+    bus = Bus([(0, 0, 0.0), (300, 0, math.pi)], [(100, 0), (120, 0)], names=names)
+    bus.run(1)
+    ledger = bus.sides[1]._ledger
+    assert {one, two} & set(ledger.auctions)
+    before = dict(ledger._trails._trails)
+    ledger.uncross(one, (100.0, 0.0))
+    assert not {one, two} & set(ledger.auctions)
+    assert ledger._trails._trails == {one: before[two], two: before[one]}
+
+
+def test_an_awarded_auction_goes_on_when_another_announces_the_target():
+    bus = Bus([(0, 0, 0.0), (60, 0, 0.0)], [(100, 0)], seers={0: {0}})
+    ledger = bus.sides[0]._ledger
+    while not any(auction.award for auction in ledger.auctions.values()):
+        bus.tick()
+        assert bus.time < 20.0
+    ((name, auction),) = ledger.auctions.items()
+    award = auction.award
+    word = Announce(2, 1, bus.time, target=name, position=(100, 0), course=0.0, cost=1.0)
+    bus.inboxes[0] = [word]
+    bus.dead.add(1)
+    bus.run(3)
+    assert ledger.auctions[name].award == award
+    assert ledger.auctions[name].tries == 2

@@ -5,9 +5,11 @@ import numpy as np
 from staniel.cooperation.cost import Goal, Price, Prices
 from staniel.cooperation.ledger import Ledger
 from staniel.datatypes.belief import TrackId
-from staniel.datatypes.message import Announce, Bid, Handover, Revoke
+from staniel.datatypes.message import COST_TERMS, Announce, Bid, Handover, Revoke
 
 __all__ = ["Bidder"]
+
+_HANDOVER = COST_TERMS.index("handover")
 
 
 class Bidder:
@@ -87,6 +89,8 @@ class Bidder:
             )
             return False
         if own is not None and own in ledger.auctions:
+            if ledger.auctions[own].award is not None:
+                return False  # Who won it says so; until then the award is to be repeated.
             if (own, ledger.agent) < (target, message.sender):
                 return False  # The auction of the older name goes on; the other hears of it too.
             del ledger.auctions[own]
@@ -101,7 +105,7 @@ class Bidder:
             return price
         terms = list(price.terms)
         if terms:
-            terms[6] = margin
+            terms[_HANDOVER] = margin
         return Price(price.cost + margin, tuple(terms))
 
 

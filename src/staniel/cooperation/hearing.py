@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from staniel.cooperation.ledger import Ledger
-from staniel.cooperation.table import Lease
+from staniel.cooperation.table import Holding, Lease
 from staniel.datatypes.belief import TrackId
 from staniel.datatypes.message import (
     Acknowledge,
@@ -57,7 +57,7 @@ class Hearing:
             case Heartbeat():
                 self._hear_heartbeat(message)
             case Beacon() if message.sender == self._centre:
-                self._led_at = message.time
+                self._led_at = max(self._led_at, message.time)
             case Bid():
                 self._ledger.bids.append((self._ledger.time, message))
             case Award():
@@ -96,13 +96,26 @@ class Hearing:
         own = ledger.own_name(target, place)
         self._settle(target, sender)
         if ledger.holding is not None and ledger.holding.id in (target, own):
-            # Both as of the same instant: never do both yield.
-            mine = ledger.said.get(message.time, -math.inf)
-            since = ledger.holding.since
-            if message.time < since or (message.cost, -sender) > (mine, -ledger.agent):
-                return  # The other one yields when it hears our heartbeat.
+            if not self._yields(message, ledger.holding):
+                return  # The other one does when it hears our heartbeat.
             ledger.holding = None
         ledger.rename(own, target)
+
+    def _yields(self, message: Heartbeat, holding: Holding) -> bool:
+        """Whether the agent leaves its target to another one that says it holds it, too."""
+        ledger = self._ledger
+        if message.time < max(holding.since, ledger.time - ledger.config.lease):
+            return False
+        # Both compare the same two words: of the lower number the last until one of the higher, and
+        # of the higher the next after that, which may be this step's. Where they speak at the same
+        # instants these are of one, and never do both yield; else they may, while costs cross.
+        if ledger.agent < message.sender:
+            before = [(t, cost) for t, cost in ledger.said.items() if t <= message.time]
+            mine = max(before)[1] if before else -math.inf
+        else:
+            later = [(t, cost) for t, cost in ledger.said.items() if t >= message.time]
+            mine = min(later)[1] if later else ledger.cost
+        return (message.cost, -message.sender) <= (mine, -ledger.agent)
 
     def _correct(self, wrong: list[Unheld]) -> None:
         """Tell who still counts a target as unheld that was looked for, or is known otherwise."""

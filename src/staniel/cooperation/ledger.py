@@ -233,5 +233,9 @@ class Ledger:
         self.renames += [(target, aside), (other, target), (aside, other)]
         self.tasks[target] = replace(nearest, id=target)
         self.tasks[other] = replace(task, id=other)
+        self._trails.exchange(target, other)
+        for name in (target, other):
+            if name in self.auctions and self.auctions[name].award is None:
+                del self.auctions[name]  # It was announced at the other one's place.
         if self.holding is not None and held in (target, other):
             self.holding = replace(self.holding, id=other if held == target else target)

@@ -45,6 +45,12 @@ class Trails:
         if old in self._trails:
             self._trails[new] = self._trails.pop(old)
 
+    def exchange(self, one: TrackId, other: TrackId) -> None:
+        """Two tracks have each other's name from now on."""
+        trails = self._trails
+        moved = {new: trails.pop(old) for old, new in ((one, other), (other, one)) if old in trails}
+        trails.update(moved)
+
     def explains(self, unheld: Unheld, speeds: dict[TrackId, float]) -> bool:
         """Whether one of the tracks is that target under another name.
 
