@@ -15,7 +15,7 @@ from staniel.datatypes.threats import NO_THREATS, Carrier, Threats
 from staniel.errors import StanielError
 from staniel.guidance import NO_DANGERS, Dangers, KnownDangers
 from staniel.guidance.carriers import FORGET
-from staniel.guidance.dangers import RETELL
+from staniel.guidance.dangers import MOST_REGIONS, RETELL
 from staniel.world import Hazards
 
 BAN = RiskRegion(kind="no-fly", polygon=((0, 0), (100, 0), (100, 100)), briefed=False)
@@ -99,6 +99,16 @@ def test_regions_are_kept_for_good_and_once():
     known.step(10_000.0)
     assert known.regions == known.at(10_000.0).regions == (SOFT, BAN, MORE)
     assert known.at(0.0).rate([[60.0, 40.0, 50.0]]).tolist() == [2.5]
+
+
+def test_made_up_regions_do_not_fill_the_memory():
+    known = KnownDangers([SOFT])
+    for k in range(3):
+        centers = [(10.0 * j, float(k)) for j in range(600)]
+        told = tuple(SOFT.model_copy(update={"center": center}) for center in centers)
+        known.step(float(k), told=[Threats(regions=told)])
+    assert len(known.regions) == 1 + MOST_REGIONS
+    assert known.regions[0] == SOFT
 
 
 def test_a_region_is_told_again_and_again_by_who_noticed_it_and_by_nobody_else():

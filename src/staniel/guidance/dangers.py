@@ -19,13 +19,16 @@ from staniel.guidance.carriers import Place, Suspects
 from staniel.kernels.risk import Regions
 from staniel.kernels.threats import inside_regions, reach_chances
 
-__all__ = ["NO_DANGERS", "RETELL", "Dangers", "KnownDangers"]
+__all__ = ["MOST_REGIONS", "NO_DANGERS", "RETELL", "Dangers", "KnownDangers"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 RETELL = 10.0
 """A region that an agent noticed itself is told again so often, since words get lost [s]."""
+
+MOST_REGIONS = 1000
+"""So many regions beside those of the briefing are believed: whoever makes up more is not heeded."""
 
 _CLOCK_TOLERANCE = 1e-3  # [s]
 
@@ -157,6 +160,7 @@ class KnownDangers:
         speed: float = 4.0,
     ) -> None:
         self._regions = dict.fromkeys(briefed)
+        self._most = len(self._regions) + MOST_REGIONS
         self._arrays: Regions | None = None
         self._carried, self._suspects = carried, Suspects(speed)
         self._said: dict[RiskRegion, float] = {}
@@ -202,7 +206,7 @@ class KnownDangers:
                 )
         for threats in sources:
             for region in threats.regions:
-                if region not in self._regions:
+                if region not in self._regions and len(self._regions) < self._most:
                     self._regions[region] = None
                     self._arrays = None
         self._suspects.learn(carriers, time)
