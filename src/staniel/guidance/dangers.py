@@ -28,7 +28,7 @@ RETELL = 10.0
 """A region that an agent noticed itself is told again so often, since words get lost [s]."""
 
 MOST_REGIONS = 1000
-"""So many regions beside those of the briefing are believed: whoever makes up more is not heeded."""
+"""So many regions are believed beside those of the briefing: who makes up more is not heeded."""
 
 _CLOCK_TOLERANCE = 1e-3  # [s]
 
