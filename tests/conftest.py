@@ -9,10 +9,19 @@ from pathlib import Path
 import pytest
 
 from staniel.kernels.cache import drop_stale
+from staniel.kernels.warm import warm_all
+from staniel.scenario import load_scenario
+from staniel.scenario.assemble import kernels_of
 
 LONGEST_FIRST = ("test_wheel", "test_downtown", "test_study_kill", "test_examples", "test_survives")
 
 drop_stale()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile what missions call once, before several workers would do it all at the same time."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        warm_all(lambda done, total: None, kernels_of(load_scenario("downtown")))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,7 +1,12 @@
 """After `warm_all` nothing compiles, in flight or after it: no kernel meets a type new to it."""
 
 import importlib
+import os
 import pkgutil
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from numba.core.dispatcher import Dispatcher
@@ -65,3 +70,23 @@ def test_progress_is_told_from_nothing_to_all():
     warm_all(lambda done, total: told.append((done, total)), ["polygon"])
     assert told[0][0] == 0
     assert told[-1][0] == told[-1][1] == len(told) - 1
+
+
+def test_on_a_new_machine_another_process_compiles_from_the_end(tmp_path):
+    """In a copy without a cache: what it was left to compile is there, and then it is gone."""
+    source = Path(staniel.__file__).parent
+    shutil.copytree(source, tmp_path / "staniel", ignore=shutil.ignore_patterns("__pycache__"))
+    script = """
+import time
+from pathlib import Path
+from staniel.kernels import warm
+folder = Path(warm.__file__).parent / "__pycache__"
+with warm._another_from_the_end(["walls", "polygon"]):
+    end = time.monotonic() + 120.0
+    while not list(folder.glob("polygon.*.nbi")) and time.monotonic() < end:
+        time.sleep(0.1)
+assert list(folder.glob("polygon.*.nbi"))
+"""
+    path = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", script], env=path, cwd=tmp_path, check=False)
+    assert done.returncode == 0
