@@ -34,6 +34,7 @@ class Bus:
         self.dead, self.log, self.time = set(), [], 0.0
         self.health, self.alone = {}, set()
         self.trackers = {}  # of each target; not told: all
+        self.overdue = 0.0  # share of the streets
         self.offsets = {}  # of an agent's instants within the second
 
     def cost(self, agent, target):
@@ -77,11 +78,12 @@ class Bus:
                 self.prices(agent),
                 health=self.health.get(agent, "healthy"),
                 alone=agent in self.alone,
+                overdue=self.overdue,
             )
             for old, new in side.renames:
                 key = next(k for k, name in self.names.items() if k[0] == agent and name == old)
                 self.names[key] = new
-            role = "search" if side.holding is None else "pursue"
+            role = "patrol" if side.patrolling else "search" if side.holding is None else "pursue"
             said += [*out, side.heartbeat(role, (0.0, 0.0))]
         self.log += said
         self.inboxes = [

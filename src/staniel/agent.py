@@ -258,10 +258,11 @@ class Agent:
             lambda goals: self._costs.prices(situation, goals),
             health=fit or "healthy",
             alone=alone,
+            overdue=self._search.overdue(time, config.revisit_after),
         )
         for old, new in allocation.renames:
             self._tracker.rename(old, new)
-        able = allocation.holding is None and not fit and not alone
+        able = not (allocation.holding or allocation.patrolling or fit or alone)
         need = None if alone else self._need_of_help()
         said = self._assistance.step(time, pose, allocation.holding, need, able, inbox)
         outbox += [
@@ -345,6 +346,8 @@ class Agent:
                 self._search.forget_goal()
                 return *self._chase(time, pose, track, "pursue"), held.position
             self._give_up_in_time(time, pose, held, outbox)
+        if self._allocation.patrolling:
+            self._last_place = None
         if self._assistance.target is not None:
             return self._help(time, pose, self._assistance.target)
         if self._last_place is not None:
@@ -358,7 +361,8 @@ class Agent:
             return self._circle(pose, place), "standby", place
         start, goal = self._search.leg(time, pose, self._lost_clouds)
         airframe = self._briefing.airframe
-        return FlyLine(start, goal, airframe.speed, airframe.altitude), "search", goal
+        role = "patrol" if self._allocation.patrolling else "search"
+        return FlyLine(start, goal, airframe.speed, airframe.altitude), role, goal
 
     def _give_up_in_time(
         self, time: float, pose: Pose, held: Holding, outbox: list[Message]

@@ -144,9 +144,6 @@ class Ground:
         )
         table = costs[0].reshape(len(pilots), len(goals))
         for column, track in enumerate(tracks):
-            if config.revisit_after:
-                waited = max(time - track.last_seen - config.revisit_after, 0.0)
-                table[:, column] -= airframe.speed * waited
             for row, pilot in enumerate(pilots):
                 if self._assigned.get(pilot) == track.id:
                     table[row, column] -= config.handover_margin

@@ -209,20 +209,32 @@ def test_who_does_not_cooperate_follows_the_nearest_that_it_sees_and_says_nothin
     assert {m.kind for m in bus.log} == {"heartbeat"}
 
 
-def test_more_targets_than_agents_are_visited_in_turn():
-    """One agent, three targets, of which it sees the one it holds."""
-    seers = {0: {0}, 1: {0}, 2: {0}}
-    config = CooperationConfig(revisit_after=45.0)
-    bus = Bus([(0, 0, 0.0)], [(50, 0), (0, 90), (-90, 0)], seers=seers, config=config)
-    held = []
-    for _ in range(400):
+def test_holders_patrol_while_streets_are_overdue_and_then_take_targets_again():
+    bus = Bus([(0, 0, 0.0), (300, 0, math.pi)], [(50, 0), (250, 0)]).run(10)
+    held = [side.holding.since for side in bus.sides]
+    awarded = len(bus.said(Award))
+    bus.overdue = 0.3
+    began = []
+    for _ in range(40):
         bus.tick()
-        mine = [k for k in range(3) if bus.holders(k)]
-        bus.seers = {k: {0} if k in mine or bus.time < 3 else set() for k in range(3)}
-        for k in range(3):
-            bus.trackers[k] = {0} if bus.seers[k] or (mine and k == mine[0]) else set()
-        held += mine
-    assert set(held[-150:]) == {0, 1, 2}
+        began += [bus.time for side in bus.sides if side.patrolling]
+    assert min(began) >= min(held) + bus.config.revisit_dwell
+    assert all(side.patrolling and side.holding is None for side in bus.sides)
+    assert len(bus.said(Award)) == awarded  # nobody takes one meanwhile
+    bus.overdue = 0.07  # not enough yet
+    bus.run(5)
+    assert all(side.patrolling for side in bus.sides)
+    bus.overdue = 0.01
+    bus.run(12)
+    assert sorted(bus.holders(0) + bus.holders(1)) == [0, 1]
+
+
+def test_nobody_patrols_where_another_is_free():
+    bus = Bus([(0, 0, 0.0), (300, 0, math.pi)], [(50, 0)]).run(10)
+    bus.overdue = 0.5
+    bus.run(60)
+    assert not any(side.patrolling for side in bus.sides)
+    assert len(bus.holders(0)) == 1
 
 
 def test_names_that_a_holder_uses_the_other_way_round_are_exchanged():

@@ -46,6 +46,19 @@ def test_cells_are_the_streets(city):
                 assert ages[row, column] == NEVER
 
 
+def test_what_is_overdue(city):
+    search = SearchMap(city, AIRFRAME, CAMERA, cell=CELL)
+    assert search.overdue(30.0, 45.0) == 0.0  # nobody could have looked for so long
+    assert search.overdue(50.0, 45.0) == 1.0
+    assert search.overdue(50.0, 0.0) == 0.0
+    search.look(50.0, level(200.0, 150.0))
+    streets = search.ages[~np.isnan(search.ages)]
+    for time in (60.0, 94.0, 96.0):
+        share = (streets < time - 45.0).mean()
+        assert search.overdue(time, 45.0) == pytest.approx(share)
+    assert 0.0 < search.overdue(60.0, 45.0) < 1.0
+
+
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0, 400), st.floats(0, 300), st.floats(-3.1, 3.1), st.floats(-0.6, 0.6))
 def test_a_look_marks_what_the_camera_sees_and_nothing_else(x, y, heading, bank):

@@ -53,6 +53,11 @@ def slow(record):
             for row in record.decisions
             if abs(row["time"] - time) < 1e-6
         }
+        patrols = {
+            row["agent"]
+            for row in record.decisions
+            if abs(row["time"] - time) < 1e-6 and row["role"] == "patrol"
+        }
         known, held = set(), set()
         for row in record.tracks[np.abs(record.tracks["time"] - time) < 1e-6]:
             ways = [math.dist((row["x"], row["y"]), v[:2]) for v in record.vehicles[k]]
@@ -64,7 +69,11 @@ def slow(record):
         free = {
             a
             for a in range(agents)
-            if targets.get(a, "") == "" and condition[a, 1] and condition[a, 2] and condition[a, 3]
+            if targets.get(a, "") == ""
+            and a not in patrols
+            and condition[a, 1]
+            and condition[a, 2]
+            and condition[a, 3]
         }
         for vehicle in range(vehicles):
             holders = [a for a, v in held if v == vehicle]

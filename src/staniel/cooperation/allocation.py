@@ -72,6 +72,7 @@ class Allocation:
         *,
         health: str = "healthy",
         alone: bool = False,
+        overdue: float = 0.0,
     ) -> list[Message]:
         """Hear what was said, decide, and say what follows.
 
@@ -90,6 +91,8 @@ class Allocation:
             The agent's own.
         alone : bool
             It does not cooperate: it follows the nearest target that it sees, and says nothing.
+        overdue : float
+            Share of the streets that were not looked at for `CooperationConfig.revisit_after`.
 
         Returns
         -------
@@ -109,15 +112,22 @@ class Allocation:
             self._auctioneer.tend()
             ledger.note_unheld()
             self._auctioneer.open_due(prices)
-            self._relief.relieve_or_revisit(prices)
-        elif health == "blind" and ledger.holding is not None:
-            ledger.let_go()
+            self._relief.relieve_or_patrol(overdue)
+        else:
+            ledger.patrolling = False
+            if health == "blind" and ledger.holding is not None:
+                ledger.let_go()
         return ledger.outbox
 
     @property
     def holding(self) -> Holding | None:
         """The target to pursue."""
         return self._ledger.holding
+
+    @property
+    def patrolling(self) -> bool:
+        """Whether it lets all targets be, and looks where nobody has looked for long."""
+        return self._ledger.patrolling
 
     @property
     def renames(self) -> list[tuple[TrackId, TrackId]]:

@@ -119,7 +119,7 @@ class Auctioneer:
         winner = self._joint(target, offers, bids) if joint else lowest(offers)
         if winner is None:
             del ledger.auctions[target]
-            free = any(b.target is None and b.health == "healthy" for b in ledger.beats.values())
+            free = any(beat.is_free for beat in ledger.beats.values())
             pause = 2.0 * ledger.bid_time if free else UNSOLD_PAUSE
             ledger.paused[target] = ledger.time + pause
             return

@@ -95,11 +95,11 @@ class CooperationConfig(Config):
     revisit_after: float = Field(
         0.0,
         ge=0.0,
-        description="a holder leaves its target for one that nobody holds and nobody has seen "
+        description="holders leave their targets and patrol while many streets were not looked at "
         "for this long; 0: never [s]",
     )
     revisit_dwell: float = Field(
-        15.0, ge=0.0, description="a target is held at least so long before it is left [s]"
+        15.0, ge=0.0, description="a target is held at least so long before a patrol [s]"
     )
     unheld_memory: float = Field(
         120.0, ge=0.0, description="a target that nobody holds is remembered for [s]"

@@ -148,7 +148,7 @@ class Hearing:
         for award in sorted(awards, key=lambda award: (award.cost, award.target)):
             ordered = award.sender == self._centre
             held = ledger.holding is not None and ledger.holding.id == award.target
-            if held or (wanted is None and (ordered or ledger.free) and ledger.health != "blind"):
+            if held or (wanted is None and (ordered or ledger.free) and self._may_take):
                 if not held:
                     ledger.rename(ledger.own_name(award.target, award.position), award.target)
                     if ledger.holding is not None and ledger.holding.id != award.target:
@@ -158,6 +158,10 @@ class Hearing:
                 ledger.say(Acknowledge, target=award.target, auctioneer=award.sender)
             else:
                 ledger.say(Release, target=award.target, position=award.position, lost=False)
+
+    @property
+    def _may_take(self) -> bool:
+        return self._ledger.health != "blind" and not self._ledger.patrolling
 
     def _hear_revoke(self, message: Revoke) -> None:
         ledger = self._ledger

@@ -42,6 +42,8 @@ class Ledger:
         The agent's own.
     health : {"healthy", "blind", "weak"}
         The agent's own.
+    patrolling : bool
+        It lets all targets be, and looks where nobody has looked for long.
     tasks : dict of TrackId to Task
         All its live tracks.
     holding : Holding or None
@@ -74,7 +76,7 @@ class Ledger:
         self.agent, self.config = agent, config
         self.bid_time = config.bid_wait * step
         self.time, self.pose = -math.inf, Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        self.health = "healthy"
+        self.health, self.patrolling = "healthy", False
         self.tasks: dict[TrackId, Task] = {}
         self.holding: Holding | None = None
         self.said: dict[float, float] = {}
@@ -139,8 +141,8 @@ class Ledger:
 
     @property
     def able(self) -> bool:
-        """Whether it bids: it is free, and fit."""
-        return self.health == "healthy" and self.free
+        """Whether it bids: it is free, fit, and not on patrol."""
+        return self.health == "healthy" and self.free and not self.patrolling
 
     def is_busy_with(self, target: TrackId) -> bool:
         """Whether the agent holds it, auctions it, or lets it rest."""

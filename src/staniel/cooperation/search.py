@@ -142,6 +142,13 @@ class SearchMap:
         told = unpack_looked(cells, self._shape, time)
         np.maximum(self._told, told, out=self._told, where=self._streets)
 
+    def overdue(self, time: float, age: float) -> float:
+        """Share of the street cells not looked at for longer than `age` [s]; 0 where that is 0."""
+        if not 0.0 < age < time or not self._streets.any():
+            return 0.0
+        looked = np.maximum(self._told, self._guessed)[self._streets]
+        return float((looked < time - age).mean())
+
     def leg(
         self, time: float, pose: Pose, lost: Callable[[], Iterable[Cloud]] = _nowhere
     ) -> tuple[Point, Point]:
@@ -185,7 +192,9 @@ class SearchMap:
         searching = [
             beat
             for _, beat in sorted(self._others.items())
-            if beat.role == "search" and beat.health != "blind" and time - beat.time < STALE
+            if beat.role in ("search", "patrol")
+            and beat.health != "blind"
+            and time - beat.time < STALE
         ]
         factors: NDArray[np.float64] = lost_factors(
             lost, self._shape, self._cell, sight_radius(self._airframe, self._camera)

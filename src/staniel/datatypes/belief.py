@@ -189,8 +189,8 @@ class Belief:
     ----------
     tracks : sequence of TrackEstimate
     role : str
-        ``"search"``, ``"pursue"``, ``"help"``, ``"recover"``, ``"standby"`` where it cannot see,
-        or ``"loiter"`` where its policy found no flight that is safe.
+        ``"search"``, ``"pursue"``, ``"help"``, ``"recover"``, ``"patrol"``, ``"standby"`` where it
+        cannot see, or ``"loiter"`` where its policy found no flight that is safe.
     target : TrackId or None
         The track it is responsible for.
     goal : (float, float) [m]

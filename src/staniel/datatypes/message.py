@@ -118,6 +118,11 @@ class Heartbeat(Message):
     health: str = "healthy"
     unheld: tuple[Unheld, ...] = ()
 
+    @property
+    def is_free(self) -> bool:
+        """Whether the sender could take a target."""
+        return self.target is None and self.health == "healthy" and self.role != "patrol"
+
 
 @dataclass(frozen=True, slots=True)
 class Report(Message):

@@ -51,7 +51,7 @@ __all__ = [
     "word_fault",
 ]
 
-ROLES: Final = ("search", "pursue", "help", "recover", "loiter", "standby")
+ROLES: Final = ("search", "pursue", "help", "recover", "loiter", "standby", "patrol")
 HEALTHS: Final = ("healthy", "blind", "weak")
 REASONS: Final = ("visibility", "value", "avoidance")
 

@@ -77,6 +77,8 @@ def custody(record: Record) -> Custody:
     target = np.full((n, agents), "", dtype=record.decisions.dtype["target"])
     decisions = record.decisions[record.decisions["agent"] < agents]
     target[_ticks(record, decisions["time"]), decisions["agent"]] = decisions["target"]
+    patrols = np.zeros((n, agents), dtype=np.bool_)
+    patrols[_ticks(record, decisions["time"]), decisions["agent"]] = decisions["role"] == "patrol"
     tracks = record.tracks[record.tracks["agent"] < agents]
     if vehicles and len(tracks):
         ticks = _ticks(record, tracks["time"])
@@ -91,7 +93,7 @@ def custody(record: Record) -> Custody:
     flying = condition[:, :, FLYING] > 0.0
     weak = float(record.scenario.get("cooperation", {}).get("weak_below", 0.0))
     healthy = flying & (condition[:, :, [CAMERA, RADIO]] > 0.0).all(axis=2)
-    free = healthy & (condition[:, :, ENERGY] >= weak) & (target == "")
+    free = healthy & (condition[:, :, ENERGY] >= weak) & (target == "") & ~patrols
     return Custody(known, held, free, _reach(record, flying & (condition[:, :, RADIO] > 0.0)))
 
 
