@@ -8,7 +8,7 @@
 `takeover` kills aircraft 0 after two minutes, and says how long each vehicle that it held waited
 for another holder. `team` flies the same cities with auctions, with a ground station, with nobody
 sharing out, and with one aircraft. `crowd` has six vehicles for two aircraft, with and without
-revisits. `round` times 100 agents that share out 100 new targets.
+patrols. `round` times 100 agents that share out 100 new targets.
 """
 
 import argparse
@@ -126,8 +126,8 @@ def crowd(seeds: int) -> None:
     }
     _compare(
         {
-            "no revisits": common,
-            "revisits": common | {"cooperation": {"revisit_after": 45.0}},
+            "no patrols": common,
+            "patrols": common | {"cooperation": {"revisit_after": 60.0}},
             "ground station": common | {"cooperation": {"mode": "centralised"}},
         },
         seeds,
