@@ -1,6 +1,8 @@
-"""Write the page `experiments.md` and its pictures from studies that were flown.
+"""Write the pages `experiments.md` and `beyond.md`, and their pictures, from studies that were flown.
 
-    for n in 1 2 3 4 5 6; do staniel study run $n --out flown/$n; done
+    for n in 1 2 3 4 5 6 controls cooperation losses crowd; do
+        staniel study run $n --out flown/$n
+    done
     python docs/gallery/make_experiments.py flown
 
 What the page says in words of each finding stands here; figures, intervals and verdicts come from
@@ -85,13 +87,16 @@ as many aircraft as vehicles see each of them more, and find them sooner.
 
 VERDICTS = {"supported": "**supported**", "contradicted": "**contradicted**", "open": "*open*"}
 
+THESIS = ("1", "2", "3", "4", "5", "6")
+BEYOND = ("controls", "cooperation", "losses", "crowd")
+
 INTRODUCTION = """# The experiments of the source, repeated
 
 The thesis that staniel starts from shows one run of each of its experiments (its table 8.1). Here
 each is flown {seeds} times at every point, {minutes:g} minutes each, with the thesis' own pursuit
-(`carrot`), without explicit cooperation, and with the defaults of `downtown` otherwise: {runs}
-runs. Means are over runs, with 95 % bootstrap intervals; differences are taken seed by seed. This
-page is made by
+(`carrot`) and with the defaults of `downtown` otherwise: {runs} runs. Means are over runs, with
+95 % bootstrap intervals; differences are taken seed by seed. What goes beyond the thesis is on
+[a page of its own](beyond.md). This page is made by
 
 ```text
 for n in {names}; do staniel study run $n --out flown/$n; done
@@ -103,18 +108,32 @@ python docs/gallery/make_experiments.py flown
 """
 
 
-def page(flown: Sequence[Results]) -> str:
-    """The page's text."""
+FURTHER = """# Beyond the experiments of the source
+
+What the [six experiments](experiments.md) leave open, flown in the same way: {seeds} times at every
+point, {minutes:g} minutes each, by the carrot: {runs} runs. Made by
+
+```text
+for n in {names}; do staniel study run $n --out flown/$n; done
+python docs/gallery/make_experiments.py flown
+```
+
+{cost}
+"""
+
+
+def page(introduction: str, flown: Sequence[Results]) -> str:
+    """A page's text."""
     seeds = max(len(set(results.table["seed"].to_pylist())) for results in flown)
     runs = sum(len(set(zip(*pairs(results), strict=True))) for results in flown)
-    introduction = INTRODUCTION.format(
+    head = introduction.format(
         seeds=seeds,
         minutes=flown[0].duration[0] / 60.0,
         runs=runs,
-        names=" ".join(results.study.name[0] for results in flown),
+        names=" ".join(results.folder.name for results in flown),
         cost=cost(flown),
     )
-    return "\n".join([introduction, *map(section, flown)])
+    return "\n".join([head, *map(section, flown)])
 
 
 def pairs(results: Results) -> tuple[list[int], list[int]]:
@@ -179,16 +198,20 @@ def pictures(results: Results) -> dict[str, bytes]:
 
 
 def main() -> None:
-    """Write the page and its pictures beside this file."""
+    """Write the pages and their pictures beside this file."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, help="holds studies in folders named 1 to 6")
+    parser.add_argument("folder", type=Path, help="holds studies in folders of their names")
     folder = parser.parse_args().folder
-    flown = [read_results(place) for place in sorted(folder.glob("[1-6]")) if place.is_dir()]
-    text = page(flown)
-    for results in flown:
-        for name, data in pictures(results).items():
-            (HERE / name).write_bytes(data)
-    (HERE / "experiments.md").write_text(text, encoding="utf-8")
+    pages = ("experiments.md", INTRODUCTION, THESIS), ("beyond.md", FURTHER, BEYOND)
+    for name, introduction, studies in pages:
+        flown = [read_results(folder / study) for study in studies if (folder / study).is_dir()]
+        if not flown:
+            continue
+        text = page(introduction, flown)
+        for results in flown:
+            for picture, data in pictures(results).items():
+                (HERE / picture).write_bytes(data)
+        (HERE / name).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
