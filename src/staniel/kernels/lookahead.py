@@ -280,7 +280,8 @@ def plan(
     weights : (t + 1, m) float array
         What seeing it there is worth.
     previous : (holds,) float array [rad]
-        A sequence that the search has to beat: what is left of the last plan.
+        A sequence that the search has to beat: what is left of the last plan, each bank taken for
+        the nearest of `search.moves`.
 
     Returns
     -------
