@@ -204,7 +204,7 @@ class Allocation:
     def _hold_nearest(self) -> None:
         """What an agent does that does not cooperate: the nearest target that it sees itself."""
         ledger = self._ledger
-        ledger.leases, ledger.auctions = {}, {}
+        ledger.leases, ledger.auctions, ledger.patrolling = {}, {}, False
         if ledger.holding is not None and ledger.holding.id in ledger.tasks:
             ledger.follow_holding()
             return
