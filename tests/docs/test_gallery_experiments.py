@@ -22,7 +22,8 @@ def script():
 
 
 def test_every_picture_is_there():
-    page = (GALLERY / "experiments.md").read_text(encoding="utf-8")
+    pages = ("experiments.md", "beyond.md")
+    page = "".join((GALLERY / name).read_text(encoding="utf-8") for name in pages)
     shown = re.findall(r"\]\(([\w.-]+\.png)\)", page)
     assert set(shown) == {path.name for path in GALLERY.glob("experiment_*.png")}
     for name in shown:
@@ -31,8 +32,14 @@ def test_every_picture_is_there():
             assert np.ptp(np.asarray(picture.convert("L"))) > 100
 
 
-@pytest.mark.parametrize("number", range(1, 7))
-def test_there_are_words_for_every_claim(script, number):
+def test_there_are_words_for_every_claim(script):
+    names = {load_study(number).name for number in script.THESIS}
+    assert names <= set(script.WORDS)
+    assert set(script.WORDS) - names <= set(script.BEYOND)
+
+
+@pytest.mark.parametrize("number", [*"123456", "crowd"])
+def test_the_words_are_about_every_claim(script, number):
     study = load_study(str(number))
     verdicts, words = script.WORDS[study.name]
     assert len(verdicts) == len(study.claims)
