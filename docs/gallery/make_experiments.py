@@ -23,8 +23,7 @@ from staniel.studies.tables import summary
 
 HERE = Path(__file__).resolve().parent
 
-YES, NO = "supported", "contradicted"
-NOT_FLOWN = "not flown yet"  # Stops the script: there are no words about it.
+YES, NO, OPEN = "supported", "contradicted", "open"
 
 WORDS: dict[str, tuple[Sequence[str], str]] = {
     "1-following": (
@@ -66,12 +65,14 @@ changes its name about twice a run from 0.7 on, hardly ever below 0.3.
 """,
     ),
     "5-aircraft": (
-        (YES, YES, YES, NOT_FLOWN, NOT_FLOWN, NOT_FLOWN),
+        (YES, OPEN, OPEN, YES, YES, YES),
         """
-Every further aircraft adds to the time in sight, the second most of all, and the longest time out
-of sight falls from 76 s to 27 s with the second and hardly below 16 s with any more. So the thesis'
-picture without explicit cooperation is confirmed: a second pair of eyes is worth most, further ones
-add little, each by what it happens to see on its own way.
+Without explicit cooperation every further aircraft adds a little to the time in sight, by what it
+happens to see on its own way; that the second adds more than the third is not shown. With it, the
+second aircraft joins the one that holds the vehicle, and that is the thesis' picture: the second
+cuts the time out of sight from 302 s to 186 s, all the four after it only to 157 s. The same second
+aircraft without being asked leaves it at 304 s, for it finds the vehicle sooner and then watches
+the rest of the city.
 """,
     ),
     "6-ratios": (
