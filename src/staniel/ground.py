@@ -124,7 +124,7 @@ class Ground:
     def _costs(
         self, time: float, pilots: list[int], tracks: list[TrackEstimate]
     ) -> NDArray[np.float64]:
-        """Dubins distances, less the margin for who is on it, less what long waiting is worth."""
+        """Dubins distances, less the margin for who is on it already."""
         config, airframe = self._briefing.cooperation, self._briefing.airframe
         starts = []
         for pilot in pilots:

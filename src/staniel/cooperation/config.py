@@ -96,7 +96,7 @@ class CooperationConfig(Config):
         0.0,
         ge=0.0,
         description="holders leave their targets and patrol while many streets were not looked at "
-        "for this long; 0: never [s]",
+        "for this long, where no station shares targets out; 0: never [s]",
     )
     revisit_dwell: float = Field(
         15.0, ge=0.0, description="a target is held at least so long before a patrol [s]"
