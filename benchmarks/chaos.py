@@ -132,8 +132,9 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = cells()
     if options.cells:
         chosen = chosen[:: max(len(chosen) // options.cells, 1)][: options.cells]
-    # Seed by seed, so that a run cut short by Ctrl-C has flown all cells alike.
-    jobs = [(cell, 1000 + seed) for seed in range(options.seeds) for cell in chosen]
+    # One of each cell after the other, so that a run cut short by Ctrl-C has flown all alike; no
+    # two missions have a city, traffic or bad luck in common.
+    jobs = [(cell, 1000 + k) for k, cell in enumerate(chosen * options.seeds)]
     started = time.monotonic()
     found: dict[Cell, list[Any]] = {cell: [] for cell in chosen}
     with multiprocessing.get_context("spawn").Pool(options.workers, _leave_stopping) as pool:

@@ -19,7 +19,7 @@ def run():
     ]
     scenario = staniel.load_scenario(
         "downtown",
-        seed=5,
+        seed=10,
         minutes=2.5,
         city={"size": [400.0, 400.0]},
         guidance={"pursuit": "carrot"},
@@ -58,14 +58,19 @@ def slow(record):
             for row in record.decisions
             if abs(row["time"] - time) < 1e-6 and row["role"] == "patrol"
         }
-        known, held = set(), set()
-        for row in record.tracks[np.abs(record.tracks["time"] - time) < 1e-6]:
+        known, held, called = set(), set(), set()
+        tracks = record.tracks[np.abs(record.tracks["time"] - time) < 1e-6]
+        for row in tracks:
             ways = [math.dist((row["x"], row["y"]), v[:2]) for v in record.vehicles[k]]
             vehicle = int(np.argmin(ways))
             if ways[vehicle] <= 15.0:
                 known.add((row["agent"], vehicle))
+                called.add((row["id"], vehicle))
                 if targets.get(row["agent"]) == row["id"]:
                     held.add((row["agent"], vehicle))
+        for agent, name in targets.items():
+            if not any(row["agent"] == agent and row["id"] == name for row in tracks):
+                held |= {(agent, vehicle) for other, vehicle in called if other == name}
         free = {
             a
             for a in range(agents)
@@ -91,6 +96,7 @@ def test_against_a_slow_reading(run):
     np.testing.assert_array_equal(kept.orphaned, orphaned)
     assert kept.held.any(axis=(0, 1)).sum() >= 2
     assert orphaned.any()
+    assert (kept.held & ~kept.known).any()  # One is on its way to what it was awarded.
 
 
 def test_the_longest_run():
@@ -104,10 +110,11 @@ def test_how_long_a_lost_holders_target_waits(run):
     kept = custody(run)
     loss = 80.0
     before = int(np.flatnonzero(run.times < loss)[-1])
-    mine = np.flatnonzero(kept.held[before, 3])
+    mine = np.flatnonzero(kept.watched[before, 3])
     found = takeover_times(run, kept, loss, 3)
     assert len(found) == len(mine)
     for vehicle, wait in zip(mine, found, strict=True):
-        others = [k for k in range(before + 1, len(run.times)) if kept.held[k, :3, vehicle].any()]
+        watched = kept.watched[:, :3, vehicle].any(axis=1)
+        others = [k for k in range(before + 1, len(run.times)) if watched[k]]
         assert wait == (run.times[others[0]] - loss if others else math.inf)
     assert takeover_times(run, kept, 0.0, 3) == []

@@ -36,7 +36,7 @@ def seed_where_it_holds(kind):
         record = staniel.fly(scenario(kind, seed)).record
         kept = custody(record)
         before = int(np.flatnonzero(record.times < FAILS)[-1])
-        if kept.held[before, 0].any():
+        if kept.watched[before, 0].any():
             return seed, record, kept
     raise AssertionError("aircraft 0 never holds anything")
 

@@ -28,7 +28,8 @@ class Custody:
     known : (n, a, v) bool array
         The agent has a live track of the vehicle.
     held : (n, a, v) bool array
-        And names it as the target that it is responsible for.
+        It names the vehicle as the target that it is responsible for: by its own track of that
+        name, or, where it has none, by another's: it was awarded it and is on its way.
     free : (n, a) bool array
         The agent is healthy and names no target.
     reach : (n, a, a) bool array
@@ -39,6 +40,11 @@ class Custody:
     held: Bools
     free: Bools
     reach: Bools
+
+    @property
+    def watched(self) -> Bools:
+        """(n, a, v): the agent holds the vehicle and has a live track of it."""
+        return self.held & self.known
 
     @property
     def doubled(self) -> Bools:
@@ -71,30 +77,42 @@ def custody(record: Record) -> Custody:
     Custody
     """
     n, agents = record.aircraft.shape[:2]
-    vehicles = record.vehicles.shape[1]
-    known = np.zeros((n, agents, vehicles), dtype=np.bool_)
-    held = np.zeros_like(known)
     target = np.full((n, agents), "", dtype=record.decisions.dtype["target"])
     decisions = record.decisions[record.decisions["agent"] < agents]
     target[_ticks(record, decisions["time"]), decisions["agent"]] = decisions["target"]
     patrols = np.zeros((n, agents), dtype=np.bool_)
     patrols[_ticks(record, decisions["time"]), decisions["agent"]] = decisions["role"] == "patrol"
-    tracks = record.tracks[record.tracks["agent"] < agents]
-    if vehicles and len(tracks):
-        ticks = _ticks(record, tracks["time"])
-        places = np.stack([tracks["x"], tracks["y"]], axis=1)
-        ways = np.linalg.norm(record.vehicles[ticks, :, :2] - places[:, None, :], axis=2)
-        nearest = ways.argmin(axis=1)
-        near = ways[np.arange(len(tracks)), nearest] <= NEAR
-        known[ticks[near], tracks["agent"][near], nearest[near]] = True
-        own = near & (tracks["id"] == target[ticks, tracks["agent"]])
-        held[ticks[own], tracks["agent"][own], nearest[own]] = True
+    known, held = _tracked(record, target)
     condition = record.condition
     flying = condition[:, :, FLYING] > 0.0
     weak = float(record.scenario.get("cooperation", {}).get("weak_below", 0.0))
     healthy = flying & (condition[:, :, [CAMERA, RADIO]] > 0.0).all(axis=2)
     free = healthy & (condition[:, :, ENERGY] >= weak) & (target == "") & ~patrols
     return Custody(known, held, free, _reach(record, flying & (condition[:, :, RADIO] > 0.0)))
+
+
+def _tracked(record: Record, target: NDArray[np.str_]) -> tuple[Bools, Bools]:
+    """`Custody.known` and `Custody.held`, given the (n, a) names of the targets."""
+    known = np.zeros((*target.shape, record.vehicles.shape[1]), dtype=np.bool_)
+    held = np.zeros_like(known)
+    tracks = record.tracks[record.tracks["agent"] < target.shape[1]]
+    if not known.size or not len(tracks):
+        return known, held
+    ticks, agents, names = _ticks(record, tracks["time"]), tracks["agent"], tracks["id"]
+    places = np.stack([tracks["x"], tracks["y"]], axis=1)
+    ways = np.linalg.norm(record.vehicles[ticks, :, :2] - places[:, None, :], axis=2)
+    nearest = ways.argmin(axis=1)
+    near = ways[np.arange(len(tracks)), nearest] <= NEAR
+    known[ticks[near], agents[near], nearest[near]] = True
+    own = names == target[ticks, agents]
+    tracking = np.zeros(target.shape, dtype=np.bool_)
+    tracking[ticks[own], agents[own]] = True
+    held[ticks[near & own], agents[near & own], nearest[near & own]] = True
+    # Who has no track of that name is responsible for what others call so.
+    named = (target[ticks] == names[:, None]) & ~tracking[ticks] & near[:, None]
+    rows, others = np.nonzero(named)
+    held[ticks[rows], others, nearest[rows]] = True
+    return known, held
 
 
 def _ticks(record: Record, times: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -130,7 +148,7 @@ def longest_run(flags: Bools, step: float) -> float:
 
 
 def takeover_times(record: Record, kept: Custody, loss: float, aircraft: int) -> list[float]:
-    """How long after an aircraft's loss each vehicle that it held was held by another one.
+    """How long after an aircraft's loss each vehicle that it watched was watched by another one.
 
     Parameters
     ----------
@@ -145,14 +163,15 @@ def takeover_times(record: Record, kept: Custody, loss: float, aircraft: int) ->
     Returns
     -------
     list of float [s]
-        One for each vehicle that it held last; infinite where nobody took it until the end.
+        One for each vehicle that it held and tracked last; infinite where nobody else held and
+        tracked it until the end.
     """
     before = np.flatnonzero(record.times < loss)
     if not len(before):
         return []
     times = []
-    for vehicle in np.flatnonzero(kept.held[before[-1], aircraft]):
-        others = np.delete(kept.held[:, :, vehicle], aircraft, axis=1).any(axis=1)
+    for vehicle in np.flatnonzero(kept.watched[before[-1], aircraft]):
+        others = np.delete(kept.watched[:, :, vehicle], aircraft, axis=1).any(axis=1)
         after = np.flatnonzero(others & (record.times >= loss))
         times.append(float(record.times[after[0]] - loss) if len(after) else float("inf"))
     return times
