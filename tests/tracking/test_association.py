@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
-from staniel.kernels.association import contested, marginals, rescore
+from staniel.kernels.association import contested, marginals, rescore, settled
 from staniel.tracking.assignment import FREE, assign
 
 CLUTTER, HIT = math.log(1e-4), 9.0
@@ -41,8 +41,7 @@ def rivals_of(p, pairs, looks):
 
 
 def owned(rule, pairs, scores, looks):
-    open_ = contested(pairs, looks)
-    return assign(rule, pairs, scores, open_, looks, CLUTTER, HIT)
+    return assign(rule, pairs, scores, looks, CLUTTER, HIT)
 
 
 @given(problems(sightings=8))
@@ -273,3 +272,26 @@ def test_greatest_scores_do_not_overflow(rule):
     owners, shares = owned(rule, pairs, scores, np.zeros(2, np.int64))
     assert owners.tolist() == [0, 1]
     assert np.isfinite(shares).all()
+
+
+@given(problems(tracks=5, sightings=6, looks=2))
+@settings(max_examples=200, deadline=None)
+def test_plain_knots_are_settled_and_all_others_left(problem):
+    pairs, scores, looks = problem
+    owners, shares, tangled = settled(pairs, scores, looks, CLUTTER)
+    worth = [p for p in range(len(pairs)) if scores[p] > CLUTTER]
+    rivals = {p: [q for q in rivals_of(p, pairs, looks) if q in worth] for p in worth}
+    for p in worth:
+        knot, edge = {p}, [p]
+        while edge:
+            new = set(rivals[edge.pop()]) - knot
+            knot |= new
+            edge += new
+        one_end = len({pairs[q, 0] for q in knot}) == 1 or len({pairs[q, 1] for q in knot}) == 1
+        assert (p in tangled) == (not one_end)
+        if one_end:
+            best = max(knot, key=lambda q: scores[q])
+            assert shares[p] == (p == best)
+            assert owners[pairs[best, 1]] == pairs[best, 0]
+    assert shares.sum() == (owners >= 0).sum()
+    assert not shares[tangled].any()

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,9 @@ from staniel.datatypes.lidar import LidarScan
 from staniel.datatypes.threats import NO_THREATS, Threats
 
 __all__ = ["Belief", "Health", "Percept", "Pose", "Sighting", "TrackEstimate", "TrackId"]
+
+
+_SEVEN = Struct("7d")
 
 
 class Pose(NamedTuple):
@@ -62,6 +66,10 @@ class Sighting:
     row : tuple
         Time, x, y, covariance xx, xy, yy with the reporter's own, reporter: as plain numbers, for
         who reads many.
+    packed : bytes
+        The same as seven doubles.
+    key : tuple
+        Reporter, time, x, y: by which a copy is recognised.
 
     Raises
     ------
@@ -81,6 +89,8 @@ class Sighting:
     pose: Pose | None = field(default=None, kw_only=True)
     pose_deviation: float = field(default=0.0, kw_only=True)
     row: tuple[float, float, float, float, float, float, int] = field(init=False, repr=False)
+    packed: bytes = field(init=False, repr=False)
+    key: tuple[int, float, float, float] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         position = checked_floats(self.position, (2,), "Sighting.position")
@@ -94,6 +104,8 @@ class Sighting:
         own = off * off
         row = (float(self.time), *position.tolist(), xx + own, xy, yy + own, self.reporter)
         object.__setattr__(self, "row", row)
+        object.__setattr__(self, "packed", _SEVEN.pack(*row))
+        object.__setattr__(self, "key", (self.reporter, *row[:3]))
         if not math.isfinite(self.time):
             raise ValueError(f"Sighting.time = {self.time}: expected a finite number of seconds")
 
@@ -116,8 +128,7 @@ class Sighting:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class TrackEstimate:
+class TrackEstimate(NamedTuple):
     """What a tracker says of one target at one time.
 
     Attributes

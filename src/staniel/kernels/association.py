@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from staniel.kernels.gating import gated
 from staniel.kernels.lanes import LANES, exp32, total_of
 
-__all__ = ["contested", "density_at", "marginals", "paired", "rescore", "warm"]
+__all__ = ["contested", "density_at", "marginals", "paired", "rescore", "settled", "warm"]
 
 Array = NDArray[Any]
 
@@ -116,8 +116,8 @@ def paired(
     gate: float,
     near: float,
     width: float,
-) -> tuple[Array, Array, Array, Array]:
-    """Pairs inside the gates, each with its score, and which of them have a rival.
+) -> tuple[Array, Array, Array]:
+    """Pairs inside the gates, each with its score, and how near each sighting is to any track.
 
     A Gaussian stands for a narrow cloud without rivals; all others are asked particle by particle.
 
@@ -131,17 +131,86 @@ def paired(
     -------
     pairs : (p, 2) int64 array
     scores : (p,) float64 array
-    contested : (p,) bool array
     nearest : (m,) float64 array [m]
     """
     pairs, scores, nearest = gated(means, covariances, origins, sightings, now, gate, near)
-    rivals = contested(pairs, looks)
-    asked = rivals.copy()
+    asked = contested(pairs, looks)
     for p in range(len(pairs)):
         cov, z = covariances[pairs[p, 0]], sightings[pairs[p, 1]]
         asked[p] |= cov[0, 0] + cov[1, 1] > _WIDE * (z[3] + z[5])
     rescore(pairs, scores, asked, state, weights, origins, covariances, sightings, now, width)
-    return pairs, scores, rivals, nearest
+    return pairs, scores, nearest
+
+
+@njit(cache=True, error_model="numpy")
+def settled(pairs: Array, scores: Array, looks: Array, least: float) -> tuple[Array, Array, Array]:
+    """Whose each sighting is, as far as that is plain: the pairs of a knot have an end in common.
+
+    A knot is what hangs together by pairs of one look that are worth more than `least`. Of pairs
+    that share their track, or their sighting, the likeliest alone can be taken.
+
+    Parameters
+    ----------
+    pairs : (p, 2) int64 array
+        Track and sighting, in ascending order of the track.
+    scores : (p,) float64 array
+    looks : (m,) int64 array
+        Number of the look of each sighting.
+    least : float
+        Pairs of no greater score are not taken.
+
+    Returns
+    -------
+    owners : (m,) int64 array
+        Track of each sighting; -1 without one.
+    shares : (p,) float64 array
+        1 for the pairs taken, else 0.
+    tangled : (t,) int64 array
+        Numbers of the pairs of the other knots: nothing is decided about them.
+    """
+    count, m = len(pairs), looks.size
+    owners, shares, tangled = np.full(m, -1), np.zeros(count), np.empty(count, np.int64)
+    knots = 0
+    of_sighting, of_track = np.zeros(m, np.int64), np.zeros(count, np.int64)
+    around, best = np.ones(m, np.bool_), np.full(m, -1)
+    for p in range(count):
+        of_sighting[pairs[p, 1]] += 1 if scores[p] > least else 0
+    first = 0
+    for p in range(count):
+        if pairs[first, 0] != pairs[p, 0]:
+            first = p
+        if scores[p] <= least:
+            continue
+        q = first
+        while q < count and pairs[q, 0] == pairs[p, 0]:
+            rival = scores[q] > least and looks[pairs[q, 1]] == looks[pairs[p, 1]]
+            of_track[p] += 1 if rival else 0
+            q += 1
+        j = pairs[p, 1]
+        around[j] &= of_track[p] == 1
+        if best[j] < 0 or scores[p] > scores[best[j]]:
+            best[j] = p
+    first = 0
+    for p in range(count):
+        if pairs[first, 0] != pairs[p, 0]:
+            first = p
+        j = pairs[p, 1]
+        if scores[p] <= least:
+            continue
+        taken, plain = best[j] == p, True
+        if not around[j]:
+            q = first
+            while q < count and pairs[q, 0] == pairs[p, 0]:
+                if scores[q] > least and looks[pairs[q, 1]] == looks[j]:
+                    plain &= of_sighting[pairs[q, 1]] == 1
+                    taken &= scores[q] < scores[p] or (scores[q] == scores[p] and q >= p)
+                q += 1
+        if not plain:
+            tangled[knots] = p
+            knots += 1
+        elif taken:
+            owners[j], shares[p] = pairs[p, 0], 1.0
+    return owners, shares, tangled[:knots]
 
 
 @njit(cache=True, error_model="numpy")
@@ -247,4 +316,5 @@ def warm() -> None:
     square = np.eye(4).reshape(1, 4, 4)
     paired(np.zeros((1, 4)), square, state, weights, np.zeros((1, 2)), z, looks, 0.0, 4.0, 1.0, 0.5)
     marginals(pairs, one, looks, 5)
+    settled(pairs, one, looks, 0.0)
     density_at(state[0], weights[0], 0.0, 0.0, 1.0, 1.0, 0.1)

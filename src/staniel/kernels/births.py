@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["fit", "follow", "propose", "warm"]
+__all__ = ["fit", "follow", "grow", "propose", "warm"]
 
 Array = NDArray[Any]
 
@@ -240,6 +240,36 @@ def follow(candidates: Array, places: Array, max_speed: float, gate: float) -> A
 
 
 @njit(cache=True, error_model="numpy")
+def grow(
+    candidates: Array,
+    sightings: Array,
+    spacing: float,
+    reach: int,
+    max_speed: float,
+    gate: float,
+    enough: int,
+) -> tuple[Array, int]:
+    """Propose places and let candidates follow them.
+
+    Parameters
+    ----------
+    candidates, max_speed, gate : as `follow` takes them
+    sightings, spacing, reach : as `propose` takes them
+    enough : int
+        Hits of a confirmed candidate.
+
+    Returns
+    -------
+    candidates : (c', 2 + 6 h) float64 array
+        As `follow` gives them.
+    confirmed : int
+        How many of them are.
+    """
+    grown = follow(candidates, propose(sightings, spacing, reach), max_speed, gate)
+    return grown, int((grown[:, 0] >= enough).sum())
+
+
+@njit(cache=True, error_model="numpy")
 def fit(candidate: Array, now: float, spread: float) -> Array:
     """Position and velocity of a confirmed candidate now: weighted least squares over its hits.
 
@@ -286,6 +316,5 @@ def fit(candidate: Array, now: float, spread: float) -> Array:
 def warm() -> None:
     """Compile (or load) every kernel here with the types used in flight."""
     sightings = np.array([[0.0, 1.0, 1.0, 1.0, 0.0, 1.0], [0.0, 1.5, 1.0, 1.0, 0.0, 1.0]])
-    places = propose(sightings, 2.0, 3)
-    candidates = follow(np.zeros((0, 20)), places, 4.0, 3.0)
+    candidates, _ = grow(np.zeros((0, 20)), sightings, 2.0, 3, 4.0, 3.0, 3)
     fit(candidates[0], 1.0, 2.0)

@@ -63,6 +63,17 @@ def log32(x: np.float32) -> np.float32:
 
 
 @njit(cache=True, error_model="numpy")
+def _folded(lanes: Array) -> float:
+    """Sum of the lanes; they are overwritten."""
+    width = LANES // 2
+    while width >= 4:
+        for lane in range(width):
+            lanes[lane] += lanes[lane + width]
+        width //= 2
+    return float((lanes[0] + lanes[2]) + (lanes[1] + lanes[3]))
+
+
+@njit(cache=True, error_model="numpy")
 def total_of(values: Array, lanes: Array) -> float:
     """Sum of a float32 array in `LANES` lanes."""
     n = values.size
@@ -71,12 +82,9 @@ def total_of(values: Array, lanes: Array) -> float:
     for first in range(0, whole, LANES):
         for lane in range(LANES):
             lanes[lane] += values[first + lane]
-    total = 0.0
-    for lane in range(LANES):
-        total += lanes[lane]
-    for i in range(whole, n):
-        total += values[i]
-    return total
+    for lane in range(n - whole):
+        lanes[lane] += values[whole + lane]
+    return _folded(lanes)
 
 
 @njit(cache=True, error_model="numpy")
@@ -88,12 +96,9 @@ def weighted(weights: Array, values: Array, lanes: Array) -> float:
     for first in range(0, whole, LANES):
         for lane in range(LANES):
             lanes[lane] += weights[first + lane] * values[first + lane]
-    total = 0.0
-    for lane in range(LANES):
-        total += lanes[lane]
-    for i in range(whole, n):
-        total += weights[i] * values[i]
-    return total
+    for lane in range(n - whole):
+        lanes[lane] += weights[whole + lane] * values[whole + lane]
+    return _folded(lanes)
 
 
 @njit(cache=True, error_model="numpy")
@@ -108,12 +113,10 @@ def weighted_product(
         for lane in range(LANES):
             i = first + lane
             lanes[lane] += weights[i] * ((a[i] - about_a) * (b[i] - about_b))
-    total = 0.0
-    for lane in range(LANES):
-        total += lanes[lane]
-    for i in range(whole, n):
-        total += weights[i] * ((a[i] - about_a) * (b[i] - about_b))
-    return total
+    for lane in range(n - whole):
+        i = whole + lane
+        lanes[lane] += weights[i] * ((a[i] - about_a) * (b[i] - about_b))
+    return _folded(lanes)
 
 
 # Without the promise that there is no NaN the comparisons do not become one instruction.

@@ -29,6 +29,8 @@ ALWAYS = (
     "gating",
     "association",
     "births",
+    "intake",
+    "lives",
     "search",
     "looked",
     "visibility",

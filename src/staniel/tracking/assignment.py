@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.kernels.association import marginals
+from staniel.kernels.association import marginals, settled
 
 __all__ = ["FREE", "Assignment", "assign"]
 
@@ -17,7 +17,6 @@ Bools = NDArray[np.bool_]
 FREE = -1
 """Owner of a sighting that is nobody's."""
 
-_SMALL = 1000  # entries of a matrix that costs less than finding the knots in it
 _ROUNDS = 30  # of belief propagation
 _EVEN = 0.5  # a sighting is the track's that more likely than not caused it
 
@@ -38,7 +37,7 @@ class Assignment(NamedTuple):
 
 
 def assign(
-    rule: str, pairs: Ints, scores: Floats, open_: Bools, looks: Ints, clutter: float, hit: float
+    rule: str, pairs: Ints, scores: Floats, looks: Ints, clutter: float, hit: float
 ) -> Assignment:
     """Decide on the pairs inside the gates.
 
@@ -53,15 +52,13 @@ def assign(
         Track and sighting.
     scores : (p,) float64 array
         Log likelihoods [log 1/m²].
-    open_ : (p,) bool array
-        Which pairs have a rival.
     looks : (m,) int64 array
     clutter : float
         Log of the density of false alarms [log 1/m²], which a score has to exceed.
     hit : float
         P_D/(1 - P_D): odds of a target in the gate to be detected.
     """
-    return _RULES[rule](pairs, scores, open_, looks, clutter, hit)
+    return _RULES[rule](pairs, scores, looks, clutter, hit)
 
 
 def _owned(pairs: Ints, taken: Bools, sightings: int) -> Assignment:
@@ -70,62 +67,44 @@ def _owned(pairs: Ints, taken: Bools, sightings: int) -> Assignment:
     return Assignment(owners, taken.astype(np.float64))
 
 
-def _nearest(
-    pairs: Ints, scores: Floats, open_: Bools, looks: Ints, clutter: float, hit: float
-) -> Assignment:
-    worth = scores > clutter
-    if not open_.any():
-        return _owned(pairs, worth, looks.size)
-    taken = worth & ~open_
-    left = np.flatnonzero(worth & open_)
-    look_of = looks[pairs[left, 1]]
-    for look in np.unique(look_of).tolist():
-        mine = left[look_of == look]
-        taken[mine[_best(pairs[mine], scores[mine] - clutter)]] = True
-    return _owned(pairs, taken, looks.size)
+def _nearest(pairs: Ints, scores: Floats, looks: Ints, clutter: float, hit: float) -> Assignment:
+    owners, shares, left = settled(pairs, scores, looks, clutter)
+    if left.size:
+        taken = left[_best(pairs[left], scores[left] - clutter, looks)]
+        owners[pairs[taken, 1]], shares[taken] = pairs[taken, 0], 1.0
+    return Assignment(owners, shares)
 
 
-def _best(pairs: Ints, gains: Floats) -> Ints:
-    """Numbers of the pairs, one a track and one a sighting at most, of the greatest sum of gains.
+def _best(pairs: Ints, gains: Floats, looks: Ints) -> Ints:
+    """Numbers of the pairs, one a sighting and one a track and look at most, of the greatest gains.
 
-    Where there are many, tracks and sightings that no pair connects are decided apart: a matrix is
-    then no larger than a knot of tracks that contest one another's sightings.
+    Tracks and sightings that no pair connects are decided apart: a matrix is no larger than a knot
+    of tracks that contest one another's sightings.
     """
-    tracks, rows = np.unique(pairs[:, 0], return_inverse=True)
-    sightings, columns = np.unique(pairs[:, 1], return_inverse=True)
-    if tracks.size * sightings.size <= _SMALL:
-        return _matched(rows, columns, gains)
+    from scipy.optimize import linear_sum_assignment
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    size = tracks.size + sightings.size
-    links = coo_array((np.ones(len(pairs)), (rows, tracks.size + columns)), shape=(size, size))
+    # A track is another one in each look.
+    _, rows = np.unique(pairs[:, 0] * looks.size + looks[pairs[:, 1]], return_inverse=True)
+    _, columns = np.unique(pairs[:, 1], return_inverse=True)
+    size = rows.max() + columns.max() + 2
+    links = coo_array((np.ones(len(pairs)), (rows, rows.max() + 1 + columns)), shape=(size, size))
     _, knot = connected_components(links, directed=False)
     chosen = []
     for label in np.unique(knot[rows]).tolist():
         own = np.flatnonzero(knot[rows] == label)
         _, row = np.unique(rows[own], return_inverse=True)
         _, column = np.unique(columns[own], return_inverse=True)
-        chosen.append(own[_matched(row, column, gains[own])])
+        shape = row.max() + 1, column.max() + 1
+        cost, number = np.zeros(shape), np.full(shape, -1)
+        cost[row, column], number[row, column] = -gains[own], np.arange(own.size)
+        best = number[linear_sum_assignment(cost)]
+        chosen.append(own[best[best >= 0]])
     return np.concatenate(chosen)
 
 
-def _matched(rows: Ints, columns: Ints, gains: Floats) -> Ints:
-    """As `_best`, by one matrix that has a row and a column of every number up to the greatest."""
-    from scipy.optimize import linear_sum_assignment
-
-    if rows.size == 1:
-        return np.zeros(1, np.int64)
-    shape = int(rows.max()) + 1, int(columns.max()) + 1
-    cost, number = np.zeros(shape), np.full(shape, -1)
-    cost[rows, columns], number[rows, columns] = -gains, np.arange(rows.size)
-    chosen: Ints = number[linear_sum_assignment(cost)]
-    return chosen[chosen >= 0]
-
-
-def _likeliest(
-    pairs: Ints, scores: Floats, open_: Bools, looks: Ints, clutter: float, hit: float
-) -> Assignment:
+def _likeliest(pairs: Ints, scores: Floats, looks: Ints, clutter: float, hit: float) -> Assignment:
     taken = np.zeros(len(pairs), np.bool_)
     served: set[tuple[int, int]] = set()
     given: set[int] = set()
@@ -141,9 +120,7 @@ def _likeliest(
     return _owned(pairs, taken, looks.size)
 
 
-def _soft(
-    pairs: Ints, scores: Floats, open_: Bools, looks: Ints, clutter: float, hit: float
-) -> Assignment:
+def _soft(pairs: Ints, scores: Floats, looks: Ints, clutter: float, hit: float) -> Assignment:
     if not len(pairs):
         return Assignment(np.full(looks.size, FREE), np.zeros(0))
     gains = hit * np.exp(np.minimum(scores - clutter, 600.0))

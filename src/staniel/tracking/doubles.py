@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from staniel.datatypes.belief import TrackEstimate, TrackId
+from staniel.datatypes.belief import TrackId
 
 __all__ = ["Doubles", "dispersion"]
 
@@ -30,24 +30,25 @@ class Doubles:
 
     def step(
         self,
-        estimates: Sequence[TrackEstimate],
+        names: Sequence[TrackId],
+        positions: NDArray[np.float64],
         owners: NDArray[np.int64],
         looks: NDArray[np.int64],
     ) -> list[tuple[int, int]]:
-        """Pairs (younger, older) that are one target, by their numbers in `estimates`.
+        """Pairs (younger, older) that are one target, by their numbers in `names`.
 
         Two tracks that took sightings of one look are two targets, however close: their count
         starts again. A track is in one pair at most.
         """
-        close = self._close(estimates)
+        close = self._close(positions)
         overlaps: dict[tuple[TrackId, TrackId], int] = {}
         doubles: list[tuple[int, int]] = []
         looked = _looked(owners, looks) if close else {}
         for a, b in close:
             if looked.get(a, set()) & looked.get(b, set()):
                 continue
-            older, younger = sorted((a, b), key=lambda k: estimates[k].id)
-            pair = (estimates[older].id, estimates[younger].id)
+            older, younger = sorted((a, b), key=lambda k: names[k])
+            pair = (names[older], names[younger])
             overlaps[pair] = self._overlaps.get(pair, 0) + 1
             taken = any(k in double for double in doubles for k in (a, b))
             if overlaps[pair] >= self._steps and not taken:
@@ -59,13 +60,13 @@ class Doubles:
         """Start again with a track that changes its name."""
         self._overlaps = {pair: n for pair, n in self._overlaps.items() if track not in pair}
 
-    def _close(self, estimates: Sequence[TrackEstimate]) -> list[tuple[int, int]]:
+    def _close(self, positions: NDArray[np.float64]) -> list[tuple[int, int]]:
         """Pairs within the distance, found by a sweep along the east axis."""
         reach = self._distance
-        east = sorted([float(estimate.position[0]) for estimate in estimates])
+        east = sorted(positions[:, 0].tolist())
         if all(b - a > reach for a, b in pairwise(east)):
             return []
-        places = [estimate.position.tolist() for estimate in estimates]
+        places = positions.tolist()
         order = sorted(range(len(places)), key=lambda k: places[k][0])
         pairs = []
         for i, a in enumerate(order):

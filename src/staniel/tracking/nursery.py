@@ -35,12 +35,14 @@ class Nursery:
         c = self._config
         if not len(free) and not len(self._candidates):
             return []
-        places = births.propose(free, c.birth_spacing, c.birth_window)
-        candidates = births.follow(self._candidates, places, c.max_speed, c.birth_gate)
-        confirmed = candidates[:, 0] >= c.confirmations
-        self._candidates = candidates
-        if not confirmed.any():
+        self._candidates, count = births.grow(
+            self._candidates, free, c.birth_spacing, c.birth_window, c.max_speed, c.birth_gate,
+            c.confirmations,
+        )  # fmt: skip
+        if not count:
             return []
+        candidates = self._candidates
+        confirmed = candidates[:, 0] >= c.confirmations
         self._candidates = np.ascontiguousarray(candidates[~confirmed])
         born = [
             (births.fit(candidate, now, 0.5 * c.max_speed), float(candidate[-6]))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from staniel.city import City
 from staniel.datatypes.belief import Sighting, TrackEstimate, TrackId
 from staniel.errors import StanielError
+from staniel.kernels import lives
 from staniel.kernels.association import paired
 from staniel.kernels.random import fold
 from staniel.tracking.assignment import FREE, assign
@@ -21,6 +22,7 @@ from staniel.tracking.doubles import Doubles, dispersion
 from staniel.tracking.intake import Batch, Intake, Key
 from staniel.tracking.memory import Memory, gain_of
 from staniel.tracking.nursery import Nursery
+from staniel.tracking.roll import Roll
 
 __all__ = ["Tracker"]
 
@@ -28,20 +30,7 @@ Floats = NDArray[np.float64]
 
 Ints = NDArray[np.int64]
 
-_LOG_ODDS_LIMIT = math.log(999.0)
 _SURPRISE = 3.0  # by so much more than its particles a missed target may have moved [m a step]
-_AT_A_TRACK = -2  # owner of a free sighting that cannot start another track
-
-
-@dataclass(slots=True)
-class _Track:
-    """What is kept of a track beside its particles, in the same order as they."""
-
-    id: TrackId
-    log_odds: float
-    last_seen: float
-    unseen: int
-    known: TrackEstimate
 
 
 class Tracker:
@@ -121,10 +110,10 @@ class Tracker:
         self.merged: list[tuple[TrackId, TrackId]] = []
         self.returned: list[TrackId] = []
         self._founder = founder
-        self._owners: dict[Key, TrackId] = {}
+        self._owners: dict[Key, TrackId | None] = {}
         self._time: float | None = None
         self._born = 0
-        self._tracks: list[_Track] = []
+        self._roll = Roll()
         self._bank = Bank(c, key, chart)
         self._intake = Intake(c.late_limit)
         self._nursery = Nursery(c)
@@ -173,39 +162,41 @@ class Tracker:
 
         bank = self._bank
         bank.predict(before, now)
-        owners, pairs, shares = self._associate(batch, now)
+        owners, pairs, shares, strangers = self._associate(batch, now)
         hits = bank.correct(now, batch.values, batch.looks, pairs, shares)
         if looks:
             self._miss_in_view(looks, hits, now)
         rows = bank.settle()
-        seen = np.zeros(bank.count, np.bool_)
-        seen[owners[owners >= 0]] = True
+        roll = self._roll
+        seen, existence = lives.live_on(
+            roll.log_odds, roll.unseen, roll.last_seen, rows[:, 9], hits, owners,
+            batch.values[:, 0],
+looks is not None, now > before, self._hit, self._miss,
+        )  # fmt: skip
+        covariances = rows[:, 4:8].copy()
         if now > before:
             bank.learn(rows, seen, now - before)
-        self._update(rows[:, 9], hits, seen, looks is not None, now > before)
-        self._note_times(owners.tolist(), batch.times)
-        self.estimates = self._describe(rows, now, seen.tolist())
-        self._owners = {
-            key: self._tracks[owner].id
-            for key, owner in zip(batch.keys, owners.tolist(), strict=True)
-            if owner >= 0
-        }
-        self._delete(rows, self._doubles.step(self.estimates, owners, batch.looks), now)
-        self._give_birth(batch.values[owners == FREE], now)
+        self.estimates = self._describe(rows, now, existence.tolist(), seen.tolist())
+        names = [roll.names[owner] if owner >= 0 else None for owner in owners.tolist()]
+        self._owners = dict(zip(batch.keys, names, strict=True))
+        doubles = self._doubles.step(roll.names, rows[:, :2], owners, batch.looks)
+        self._delete(covariances, existence, doubles, now)
+        self._give_birth(strangers, now)
         return list(self.estimates)
 
-    def _associate(self, batch: Batch, now: float) -> tuple[Ints, Ints, Floats]:
-        """Owner of each sighting, pairs inside the gates, and the share of each pair."""
+    def _associate(self, batch: Batch, now: float) -> tuple[Ints, Ints, Floats, Floats]:
+        """Owner of each sighting, pairs inside the gates, their shares, and who may be new."""
         c, bank = self.config, self._bank
-        pairs, scores, contested, nearest = paired(
+        pairs, scores, nearest = paired(
             bank.means, bank.expected, bank.state, bank.weights, bank.origins, batch.values,
             batch.looks, now, c.gate, c.birth_distance, c.kernel,
         )  # fmt: skip
         owners, shares = assign(
-            c.association, pairs, scores, contested, batch.looks, self._clutter, self._odds
+            c.association, pairs, scores, batch.looks, self._clutter, self._odds
         )
-        owners[(owners == FREE) & (nearest < c.birth_distance)] = _AT_A_TRACK
-        return owners, pairs, shares
+        # A free sighting at a track's place cannot start another one.
+        strangers = (owners == FREE) & (nearest >= c.birth_distance)
+        return owners, pairs, shares, batch.values[strangers]
 
     def _miss_in_view(self, looks: list[Coverage], hits: Ints, now: float) -> None:
         """Take weight from the particles of unseen tracks that a look would have shown."""
@@ -252,8 +243,7 @@ class Tracker:
 
     def owner_of(self, sighting: Sighting) -> TrackId | None:
         """Name of the track that a sighting handed in with the last step went to, if any."""
-        time, x, y, _, _, _, reporter = sighting.row
-        return self._owners.get((reporter, time, x, y))
+        return self._owners.get(sighting.key)
 
     def rename(self, old: TrackId, new: TrackId) -> None:
         """Give the live track `old` the name `new`.
@@ -264,21 +254,18 @@ class Tracker:
             No live track is named `old`, or another one is named `new`.
         """
         k = self._index(old)
-        if new != old and any(track.id == new for track in self._tracks):
+        if new != old and new in self._roll.names:
             raise StanielError(f"rename: {new!r} is the name of another live track")
-        track = self._tracks[k]
-        track.id = new
-        track.known = replace(track.known, id=new)
-        self.estimates[k] = replace(self.estimates[k], id=new)
+        self._roll.rename(k, new)
+        self.estimates[k] = self.estimates[k]._replace(id=new)
         self._doubles.forget(old)
         self._owners = {key: new if id == old else id for key, id in self._owners.items()}
         self._memory.forget({new})
 
     def _index(self, track: TrackId) -> int:
-        for k, live in enumerate(self._tracks):
-            if live.id == track:
-                return k
-        raise StanielError(f"no live track is named {track!r}")
+        if track not in self._roll.names:
+            raise StanielError(f"no live track is named {track!r}")
+        return self._roll.names.index(track)
 
     def _checked(self, time: float) -> float:
         now = float(time)
@@ -290,94 +277,64 @@ class Tracker:
             )
         return now
 
-    def _update(
-        self, evidence: Floats, hits: Ints, seen: NDArray[np.bool_], told: bool, moved: bool
-    ) -> None:
-        """Existence and patience of every track."""
-        for track, likelihood, looks, sure in zip(
-            self._tracks, evidence.tolist(), hits.tolist(), seen.tolist(), strict=True
-        ):
-            if looks or told:
-                track.log_odds += likelihood + looks * self._hit
-            elif moved:
-                track.log_odds += self._miss
-            track.log_odds = min(track.log_odds, _LOG_ODDS_LIMIT)
-            if sure:
-                track.unseen = 0
-            elif moved:
-                track.unseen += 1
-
-    def _note_times(self, owners: list[int], times: list[float]) -> None:
-        for owner, time in zip(owners, times, strict=True):
-            if owner >= 0:
-                track = self._tracks[owner]
-                track.last_seen = max(track.last_seen, time)
-
-    def _describe(self, rows: Floats, now: float, seen: list[bool]) -> list[TrackEstimate]:
+    def _describe(
+        self, rows: Floats, now: float, existence: list[float], seen: list[bool]
+    ) -> list[TrackEstimate]:
         rows.flags.writeable = False
-        covariances = rows[:, 4:8].reshape(-1, 2, 2)
-        turns = self._bank.habits[: len(rows), 1].tolist()
-        estimates = []
-        for k, (track, position, velocity, covariance, turn_rate) in enumerate(
-            zip(self._tracks, rows[:, :2], rows[:, 2:4], covariances, turns, strict=True)
-        ):
-            estimate = TrackEstimate(
-                track.id,
-                now,
-                position,
-                velocity,
-                covariance,
-                1.0 / (1.0 + math.exp(-track.log_odds)),
-                track.last_seen,
-                turn_rate,
-            )
-            if seen[k]:
-                track.known = estimate
-            estimates.append(estimate)
+        roll, turns = self._roll, self._bank.habits[: len(rows), 1].tolist()
+        fields = zip(
+            roll.names, repeat(now), rows[:, :2], rows[:, 2:4], rows[:, 4:8].reshape(-1, 2, 2),
+            existence, roll.last_seen.tolist(), turns,
+        )  # fmt: skip
+        estimates = list(map(TrackEstimate._make, fields))
+        for k, sure in enumerate(seen):
+            if sure:
+                roll.known[k] = estimates[k]
         return estimates
 
-    def _delete(self, rows: Floats, doubles: list[tuple[int, int]], now: float) -> None:
+    def _delete(
+        self, covariances: Floats, existence: Floats, doubles: list[tuple[int, int]], now: float
+    ) -> None:
         """Delete doubles, and what dispersed or was unseen for too long."""
-        c = self.config
-        self.merged = [(self._tracks[k].id, self._tracks[older].id) for k, older in doubles]
+        c, roll = self.config, self._roll
+        self.merged = [(roll.names[k], roll.names[older]) for k, older in doubles]
         for k, older in doubles:
-            self._inherit(k, older)
+            if self._inherit(k, older):
+                covariances[older], existence[older] = covariances[k], existence[k]
+        over = lives.ended(
+            roll.unseen, existence, covariances, c.unseen_limit, c.least_existence,
+            c.dispersion_limit,
+        )  # fmt: skip
+        self.lost = []
+        if not doubles and not over.any():
+            return
         dropped = [k for k, _ in doubles]
-        wide = (rows[:, 4] + rows[:, 7] > c.dispersion_limit**2).tolist()
-        expired = [
-            k
-            for k, track in enumerate(self._tracks)
-            if k not in dropped
-            and (
-                track.unseen >= c.unseen_limit
-                or self.estimates[k].existence < c.least_existence
-                # Nobody is dispersed whose covariance has a smaller trace than that.
-                or (wide[k] and dispersion(self.estimates[k].covariance) > c.dispersion_limit)
-            )
-        ]
-        self.lost = [self._tracks[k].known for k in expired]
+        expired = [k for k in np.flatnonzero(over).tolist() if k not in dropped]
+        self.lost = [roll.known[k] for k in expired]
         for k in expired:
             # Nobody comes back who hardly was there.
-            if self.estimates[k].existence >= c.least_existence:
-                self._memory.store(self._tracks[k].id, self._bank, k, now)
-        if dropped or expired:
-            kept = [k for k in range(len(self._tracks)) if k not in dropped and k not in expired]
-            self._tracks = [self._tracks[k] for k in kept]
-            self.estimates = [self.estimates[k] for k in kept]
-            self._bank.keep(kept)
+            if existence[k] >= c.least_existence:
+                self._memory.store(roll.names[k], self._bank, k, now)
+        self._keep([k for k in range(len(roll)) if k not in dropped and k not in expired])
 
-    def _inherit(self, younger: int, older: int) -> None:
-        """The older name lives on with the better cloud and all that was seen of both."""
-        heir, donor = self._tracks[older], self._tracks[younger]
-        if dispersion(self.estimates[younger].covariance) < dispersion(
-            self.estimates[older].covariance
-        ):
+    def _keep(self, kept: list[int]) -> None:
+        """Keep only the tracks with these numbers."""
+        self._roll.keep(kept)
+        self.estimates = [self.estimates[k] for k in kept]
+        self._bank.keep(kept)
+
+    def _inherit(self, younger: int, older: int) -> bool:
+        """The older name lives on with all that was seen of both, and with the better cloud.
+
+        Returns whether that is the younger one's.
+        """
+        estimates = self.estimates
+        better = dispersion(estimates[younger].covariance) < dispersion(estimates[older].covariance)
+        if better:
             self._bank.overwrite(older, younger)
-            self.estimates[older] = replace(self.estimates[younger], id=heir.id)
-        if donor.last_seen > heir.last_seen:
-            heir.last_seen, heir.known = donor.last_seen, replace(donor.known, id=heir.id)
-        heir.log_odds = max(heir.log_odds, donor.log_odds)
-        heir.unseen = min(heir.unseen, donor.unseen)
+            estimates[older] = estimates[younger]._replace(id=self._roll.names[older])
+        self._roll.inherit(older, younger)
+        return better
 
     def _give_birth(self, free: Floats, now: float) -> None:
         """Confirmed candidates become tracks, under an old name where a lost target returns."""
@@ -403,21 +360,16 @@ class Tracker:
         A target that suddenly drove off, say, left its particles behind.
         """
         c = self.config
-        missed = [k for k, track in enumerate(self._tracks) if track.unseen >= c.confirmations]
-        gains = [
-            gain_of(self._bank, k, place, c.newcomers, _SURPRISE * self._tracks[k].unseen)
-            for k in missed
-        ]
+        unseen = self._roll.unseen.tolist()
+        missed = [k for k, steps in enumerate(unseen) if steps >= c.confirmations]
+        gains = [gain_of(self._bank, k, place, c.newcomers, _SURPRISE * unseen[k]) for k in missed]
         best = max(zip(gains, missed, strict=True), default=(0.0, -1))
         return best[1] if best[0] > 0.0 else None
 
     def _start_again(self, k: int, place: Floats, last_seen: float, now: float) -> None:
         """A newborn takes over the name of the live track `k`, whose particles are given up."""
-        name = self._tracks[k].id
-        kept = [j for j in range(len(self._tracks)) if j != k]
-        self._tracks = [self._tracks[j] for j in kept]
-        self.estimates = [self.estimates[j] for j in kept]
-        self._bank.keep(kept)
+        name = self._roll.names[k]
+        self._keep([j for j in range(len(self._roll)) if j != k])
         self._launch(place, last_seen, now, name)
 
     def _occupied(self, place: list[float]) -> bool:
@@ -441,7 +393,6 @@ class Tracker:
             self.config.birth_existence,
             last_seen,
         )
-        odds = self.config.birth_existence / (1.0 - self.config.birth_existence)
-        self._tracks.append(_Track(estimate.id, math.log(odds), last_seen, 0, estimate))
+        self._roll.enter(estimate)
         self.estimates.append(estimate)
         self._bank.launch(place)
