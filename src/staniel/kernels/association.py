@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.gating import gated
-from staniel.kernels.lanes import LANES, exp32, total_of
+from staniel.kernels.lanes import exp32, total_of
 
 __all__ = ["contested", "density_at", "marginals", "paired", "rescore", "settled", "warm"]
 
@@ -79,7 +79,7 @@ def rescore(
     width : float
     """
     n = weights.shape[1]
-    buffer, lanes = np.empty(n, np.float32), np.empty(LANES, np.float32)
+    buffer = np.empty(n, np.float32)
     for p in range(len(pairs)):
         if not chosen[p]:
             continue
@@ -100,7 +100,7 @@ def rescore(
             dx = zx - (x[i] - age * vx[i])
             dy = zy - (y[i] - age * vy[i])
             buffer[i] = w[i] * exp32(dx * (ixx * dx + ixy * dy) + iyy * dy * dy)
-        scores[p] = np.log(total_of(buffer, lanes) + 1e-30) - _LOG_2PI - 0.5 * np.log(det)
+        scores[p] = np.log(total_of(buffer) + 1e-30) - _LOG_2PI - 0.5 * np.log(det)
 
 
 @njit(cache=True, error_model="numpy")
@@ -244,11 +244,11 @@ def density_at(
     xx, yy = xx + share * sx / n, yy + share * sy / n
     ix, iy = np.float32(-0.5 / xx), np.float32(-0.5 / yy)
     zx, zy = np.float32(x), np.float32(y)
-    buffer, lanes = np.empty(n, np.float32), np.empty(LANES, np.float32)
+    buffer = np.empty(n, np.float32)
     for i in range(n):
         dx, dy = east[i] - zx, north[i] - zy
         buffer[i] = weights[i] * exp32(ix * dx * dx + iy * dy * dy)
-    density: float = total_of(buffer, lanes) * np.exp(-_LOG_2PI) / np.sqrt(xx * yy)
+    density: float = total_of(buffer) * np.exp(-_LOG_2PI) / np.sqrt(xx * yy)
     return density
 
 

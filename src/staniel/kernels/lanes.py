@@ -1,17 +1,23 @@
 """Sums, maxima, exponentials and logarithms over float32 arrays, the same on every machine.
 
-A sum that vectorises depends on how wide the processor's registers are, unless its order is fixed:
-here it runs in `LANES` lanes, which are added up in the end.
+The order of a sum that LLVM vectorises by itself depends on how wide the processor's registers are.
+So these sums say their order: they are written in LLVM's own words, as vectors of `LANES`, which
+any processor has or makes do for.
 """
 
-from typing import Any
+import math
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
+from typing import Any, cast
 
 import numpy as np
-from numba import njit
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 __all__ = [
-    "LANES",
     "exp32",
     "greatest",
     "log32",
@@ -23,8 +29,12 @@ __all__ = [
 
 Array = NDArray[Any]
 
-LANES = 64
-"""Of a sum; a multiple of every register's width."""
+Word = Any  # of LLVM: a builder, a value, a type
+Term = Callable[..., Word]
+_slot: Term = cgutils.alloca_once_value
+
+LANES, STREAMS = 8, 4  # of a vector, and vectors that are summed side by side
+_FLOATS = types.Array(types.float32, 1, "C")
 
 _F0, _F05, _F1 = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 _LOWEST = np.float32(-87.0)
@@ -62,84 +72,125 @@ def log32(x: np.float32) -> np.float32:
     return result
 
 
-@njit(cache=True, error_model="numpy")
-def _folded(lanes: Array) -> float:
-    """Sum of the lanes; they are overwritten."""
-    width = LANES // 2
-    while width >= 4:
-        for lane in range(width):
-            lanes[lane] += lanes[lane + width]
-        width //= 2
-    return float((lanes[0] + lanes[2]) + (lanes[1] + lanes[3]))
+def _fold(
+    builder: Word,
+    made: Sequence[Word],
+    scalars: Sequence[Word],
+    term: Term,
+    join: Term,
+    start: float,
+) -> Word:
+    """``join`` of a term of all elements: in `STREAMS` vectors of `LANES`, then one, then singly.
+
+    The order stands in the program, so that it is the same on every processor.
+    """
+    single, vector = ir.FloatType(), ir.VectorType(ir.FloatType(), LANES)
+    size, index = made[0].nitems, made[0].nitems.type
+    splat = [_splat(builder, vector, scalar) for scalar in scalars]
+    streams = [_slot(builder, vector([start] * LANES)) for _ in range(STREAMS)]
+    rest = _slot(builder, single(start))
+
+    def take(
+        first: Word, last: Word, kind: Word, given: Sequence[Word], totals: Sequence[Word]
+    ) -> None:
+        width = LANES if kind is vector else 1
+        step = index(width * len(totals))
+        with cgutils.for_range_slice(builder, first, last, step, index) as (i, _):
+            for k, total in enumerate(totals):
+                at = builder.add(i, index(k * width))
+                places = [builder.gep(array.data, [at]) for array in made]
+                typed = [builder.bitcast(place, kind.as_pointer()) for place in places]
+                elements = [builder.load(place, align=4) for place in typed]
+                value = term(builder, *elements, *given)
+                builder.store(join(builder, builder.load(total), value), total)
+
+    by_streams = builder.and_(size, index(-STREAMS * LANES))
+    by_lanes = builder.and_(size, index(-LANES))
+    take(index(0), by_streams, vector, splat, streams)
+    take(by_streams, by_lanes, vector, splat, streams[:1])
+    take(by_lanes, size, single, scalars, [rest])
+    both = partial(join, builder)
+    together = reduce(both, [builder.load(stream) for stream in streams])
+    lanes = [builder.extract_element(together, ir.IntType(32)(lane)) for lane in range(LANES)]
+    while len(lanes) > 1:
+        half = len(lanes) // 2
+        lanes = list(map(both, lanes[:half], lanes[half:]))
+    return both(lanes[0], builder.load(rest))
 
 
-@njit(cache=True, error_model="numpy")
-def total_of(values: Array, lanes: Array) -> float:
-    """Sum of a float32 array in `LANES` lanes."""
-    n = values.size
-    whole = n - n % LANES
-    lanes[:] = _F0
-    for first in range(0, whole, LANES):
-        for lane in range(LANES):
-            lanes[lane] += values[first + lane]
-    for lane in range(n - whole):
-        lanes[lane] += values[whole + lane]
-    return _folded(lanes)
+def _splat(builder: Word, vector: Word, scalar: Word) -> Word:
+    """A vector whose elements are all the scalar."""
+    empty, first = ir.Constant(vector, ir.Undefined), ir.IntType(32)(0)
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+    return builder.shuffle_vector(builder.insert_element(empty, scalar, first), empty, mask)
 
 
-@njit(cache=True, error_model="numpy")
-def weighted(weights: Array, values: Array, lanes: Array) -> float:
-    """Sum of products of two float32 arrays in `LANES` lanes."""
-    n = weights.size
-    whole = n - n % LANES
-    lanes[:] = _F0
-    for first in range(0, whole, LANES):
-        for lane in range(LANES):
-            lanes[lane] += weights[first + lane] * values[first + lane]
-    for lane in range(n - whole):
-        lanes[lane] += weights[whole + lane] * values[whole + lane]
-    return _folded(lanes)
+def _generator(arrays: int, term: Term, join: Term, start: float) -> Term:
+    """What writes the program of a fold over so many arrays, and of scalars after them."""
+
+    def generate(context: Word, builder: Word, signature: Word, arguments: Word) -> Word:
+        made = [
+            context.make_array(kind)(context, builder, value)
+            for kind, value in zip(signature.args[:arrays], arguments, strict=False)
+        ]
+        return _fold(builder, made, arguments[arrays:], term, join, start)
+
+    return generate
 
 
-@njit(cache=True, error_model="numpy")
-def weighted_product(
-    weights: Array, a: Array, b: Array, about_a: np.float32, about_b: np.float32, lanes: Array
-) -> float:
-    """Sum of ``w (a - about_a) (b - about_b)`` over float32 arrays, in `LANES` lanes."""
-    n = weights.size
-    whole = n - n % LANES
-    lanes[:] = _F0
-    for first in range(0, whole, LANES):
-        for lane in range(LANES):
-            i = first + lane
-            lanes[lane] += weights[i] * ((a[i] - about_a) * (b[i] - about_b))
-    for lane in range(n - whole):
-        i = whole + lane
-        lanes[lane] += weights[i] * ((a[i] - about_a) * (b[i] - about_b))
-    return _folded(lanes)
+def _add(builder: Word, a: Word, b: Word) -> Word:
+    return builder.fadd(a, b)
 
 
-# Without the promise that there is no NaN the comparisons do not become one instruction.
-@njit(cache=True, error_model="numpy", fastmath={"nnan", "nsz"})
-def greatest(values: Array, lanes: Array) -> np.float32:
-    """Greatest of a float32 array without NaN, in `LANES` lanes as well."""
-    n = values.size
-    whole = n - n % LANES
-    lanes[:] = values[0]
-    for first in range(0, whole, LANES):
-        for lane in range(LANES):
-            value, best = values[first + lane], lanes[lane]
-            lanes[lane] = value if value > best else best
-    width = LANES // 2
-    while width >= 1:
-        for lane in range(width):
-            value, best = lanes[lane + width], lanes[lane]
-            lanes[lane] = value if value > best else best
-        width //= 2
-    top: np.float32 = lanes[0]
-    for i in range(whole, n):
-        top = values[i] if values[i] > top else top
-    return top
+def _more(builder: Word, a: Word, b: Word) -> Word:
+    return builder.select(builder.fcmp_ordered(">", b, a), b, a)
+
+
+def _itself(builder: Word, a: Word) -> Word:
+    return a
+
+
+def _product(builder: Word, a: Word, b: Word) -> Word:
+    return builder.fmul(a, b)
+
+
+def _moment(builder: Word, w: Word, a: Word, b: Word, about_a: Word, about_b: Word) -> Word:
+    return builder.fmul(w, builder.fmul(builder.fsub(a, about_a), builder.fsub(b, about_b)))
+
+
+def _total(context: object, values: object) -> object:
+    return types.float32(_FLOATS), _generator(1, _itself, _add, 0.0)
+
+
+def _greatest(context: object, values: object) -> object:
+    return types.float32(_FLOATS), _generator(1, _itself, _more, -math.inf)
+
+
+def _weighted(context: object, weights: object, values: object) -> object:
+    return types.float32(_FLOATS, _FLOATS), _generator(2, _product, _add, 0.0)
+
+
+def _weighted_product(
+    context: object, weights: object, a: object, b: object, about_a: object, about_b: object
+) -> object:
+    single = types.float32
+    kinds = (_FLOATS, _FLOATS, _FLOATS, single, single)
+    return single(*kinds), _generator(3, _moment, _add, 0.0)
+
+
+total_of = cast(Callable[[Array], float], intrinsic(_total))
+"""``total_of(values)``: sum of a contiguous float32 array."""
+
+greatest = cast(Callable[[Array], np.float32], intrinsic(_greatest))
+"""``greatest(values)``: greatest of a contiguous float32 array without NaN; of none -inf."""
+
+weighted = cast(Callable[[Array, Array], float], intrinsic(_weighted))
+"""``weighted(weights, values)``: sum of the products of two contiguous float32 arrays."""
+
+weighted_product = cast(
+    Callable[[Array, Array, Array, np.float32, np.float32], float], intrinsic(_weighted_product)
+)
+"""``weighted_product(w, a, b, about_a, about_b)``: sum of ``w (a - about_a) (b - about_b)``."""
 
 
 def warm() -> None:

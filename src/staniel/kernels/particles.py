@@ -11,7 +11,6 @@ from numba import njit
 from numpy.typing import NDArray
 
 from staniel.kernels.lanes import (
-    LANES,
     exp32,
     greatest,
     total_of,
@@ -36,26 +35,24 @@ def draws_of(particles: int) -> int:
 
 
 @njit(cache=True, error_model="numpy")
-def _weighed(
-    state: Array, logs: Array, own: Array, lanes: Array, out: Array
-) -> tuple[float, float]:
+def _weighed(state: Array, logs: Array, own: Array, out: Array) -> tuple[float, float]:
     """Weights by log-sum-exp, not normalised yet, and all moments.
 
     Returns the greatest log weight and the sum of the weights in units of the greatest. `out` is a
     row as `settle` gives it.
     """
-    top = greatest(logs, lanes)
+    top = greatest(logs)
     for i in range(own.size):
         own[i] = exp32(logs[i] - top)
-    total = total_of(own, lanes)
+    total = float(total_of(own))
     share = 1.0 / total
     for row in range(4):
-        out[row] = share * weighted(own, state[row], lanes)
+        out[row] = share * weighted(own, state[row])
     x, y, mx, my = state[0], state[1], np.float32(out[0]), np.float32(out[1])
-    out[4] = share * weighted_product(own, x, x, mx, mx, lanes)
-    out[5] = out[6] = share * weighted_product(own, x, y, mx, my, lanes)
-    out[7] = share * weighted_product(own, y, y, my, my, lanes)
-    out[8] = total * total / weighted(own, own, lanes)
+    out[4] = share * weighted_product(own, x, x, mx, mx)
+    out[5] = out[6] = share * weighted_product(own, x, y, mx, my)
+    out[7] = share * weighted_product(own, y, y, my, my)
+    out[8] = total * total / float(weighted(own, own))
     return float(top), total
 
 
@@ -108,14 +105,14 @@ def settle(
     n = state.shape[2]
     half = (n + 1) // 2
     out = np.empty((count, 10), np.float64)
-    buffer, lanes = np.empty(n, np.float32), np.empty(LANES, np.float32)
+    buffer = np.empty(n, np.float32)
     noise, chosen = np.empty((4, half), np.float32), np.empty(n, np.int32)
     even, level = np.float32(1.0 / n), np.float32(-np.log(n))
     mean = np.empty(4)
     drawn = 4 if whole else 2
     for k in range(count):
         logs, own, row, rest = log_weights[k], weights[k], out[k], rests[k]
-        top, total = _weighed(state[k], logs, own, lanes, row)
+        top, total = _weighed(state[k], logs, own, row)
         row[0] += origins[k, 0]
         row[1] += origins[k, 1]
         for a in range(2):
