@@ -137,7 +137,8 @@ def crowd(seeds: int) -> None:
 
 def _spread(n: int, rng: np.random.Generator) -> list[tuple[float, float]]:
     """Places in a square, no two of which could be one target."""
-    side, places = 150.0 * math.sqrt(n), []
+    side = 150.0 * math.sqrt(n)
+    places: list[tuple[float, float]] = []
     while len(places) < n:
         place = tuple(rng.uniform(0.0, side, 2).tolist())
         if all(math.dist(place, other) > 40.0 for other in places):

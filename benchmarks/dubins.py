@@ -66,7 +66,7 @@ def by_core(library: str, starts: Floats, goals: Floats) -> Rival:
     call.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
     call.restype = ctypes.c_int
 
-    @njit
+    @njit(error_model="numpy")
     def run(a: Floats, b: Floats, radius: float) -> Floats:
         out = np.empty(a.shape[0])
         path = np.zeros(8)  # Start, three pieces in radii, the radius, the word.

@@ -173,31 +173,79 @@ def fly(case: Case, guidance: dict[str, Any], minutes: float, seed: int) -> Flow
 
 
 def fly_knowing(case: Case, minutes: float, seed: int) -> Flown:
-    """One aircraft, no mission: a wide search that knows where the target will be, 30 s ahead."""
+    """No mission: a wide search that knows where the target will be, 30 s ahead.
+
+    Of several aircraft each in turn plans for what the plans of the others leave unseen, twice.
+    """
     mission, city = begin(case, CARROTS[0], seed, minutes)
     aircraft, vehicles = paths_of(mission)
     scenario = scenario_of(case, CARROTS[0], seed, minutes)
     camera = scenario.camera
     if not len(aircraft):
         return judged(city, camera, aircraft, vehicles)
-    eye = Eye(camera.mounting, camera.half_aperture, camera.range)
-    pose, places = aircraft[0, 0].copy(), vehicles[:, 0, :2]
-    frame = scenario.airframes[0].model_copy(update={"altitude": float(pose[2])})
-    horizon, commit = 30, 3
+    horizon, commit, step = 30, 3, 0.5
     config = LookaheadConfig(horizon=horizon, banks=9, width=400, polish=2)
-    search = new_search(city, frame, eye, camera.target_height, config)
-    memory, left, flown = new_sightlines(pose[2], camera.target_height), np.zeros(horizon), []
-    for second in range(0, round(len(places) * FINE), commit):
-        samples = np.round((second + 0.5 * np.arange(2 * horizon + 1)) / FINE).astype(int)
-        future = places[np.minimum(samples, len(places) - 1)][:, None]
-        weights = np.ones(future.shape[:2])
-        left, _ = plan(city.walls, memory, eye, search, *no_regions(), pose, future, weights, left)
-        steps = round(commit / FINE)
-        way = roll_out(pose, left, 1.0, 0.0, steps, FINE, search.roll_gain, search.roll_rate)
-        flown.append(way[:-1])
-        pose, left = way[-1].copy(), np.concatenate((left[commit:], np.zeros(commit)))
-    path = np.concatenate(flown)[: len(places), None]
+    team = [Knowing(city, scenario, pose.copy(), config) for pose in aircraft[0]]
+    for second in range(0, round(len(vehicles) * FINE), commit):
+        samples = np.round((second + step * np.arange(2 * horizon + 1)) / FINE).astype(int)
+        future = np.ascontiguousarray(vehicles[np.minimum(samples, len(vehicles) - 1)])
+        for one in team * (1 if len(team) == 1 else 2):
+            unseen = np.ones((len(future), 1))
+            for other in team:
+                if other is not one:
+                    unseen[other.sees(future, step)] = 0.0
+            one.decide(future, unseen)
+        for one in team:
+            one.fly(commit)
+    path = np.stack([np.concatenate(one.flown)[: len(vehicles)] for one in team], axis=1)
     return judged(city, camera, np.ascontiguousarray(path), vehicles)
+
+
+class Knowing:
+    """An aircraft that plans with the target's future."""
+
+    def __init__(
+        self, city: City, scenario: Scenario, pose: NDArray[Any], config: LookaheadConfig
+    ) -> None:
+        camera = scenario.camera
+        self._city, self._height = city, camera.target_height
+        self._eye = Eye(camera.mounting, camera.half_aperture, camera.range)
+        self._pose = pose
+        self._frame = scenario.airframes[0].model_copy(update={"altitude": float(pose[2])})
+        self._search = new_search(city, self._frame, self._eye, camera.target_height, config)
+        self._memory = new_sightlines(pose[2], camera.target_height)
+        self._plan = np.zeros(config.horizon)
+        self.flown: list[NDArray[Any]] = []
+
+    def decide(self, future: NDArray[Any], weights: NDArray[Any]) -> None:
+        """Plan for the target's (t, 1, 4) future, a sight of which is worth its weight."""
+        banks, _ = plan(
+            self._city.walls, self._memory, self._eye, self._search, *no_regions(), self._pose,
+            np.ascontiguousarray(future[:, :, :2]), weights, self._plan,
+        )  # fmt: skip
+        self._plan = banks if len(banks) else self._plan
+
+    def sees(self, future: NDArray[Any], step: float) -> NDArray[np.bool_]:
+        """At which instants of the future its plan has the target in sight."""
+        eye, way = self._eye, self._way(len(future) - 1, step)
+        seen: NDArray[np.bool_] = seen_by(
+            self._city.walls, way[:, None], future, self._height, eye.half_aperture, eye.reach,
+            eye.mount, np.full((len(way), 1, 2), np.nan),
+        )[:, 0] > 0  # fmt: skip
+        return seen
+
+    def fly(self, seconds: int) -> None:
+        """Fly the first seconds of the plan."""
+        way = self._way(round(seconds / FINE), FINE)
+        self.flown.append(way[:-1])
+        self._pose = way[-1].copy()
+        self._plan = np.concatenate((self._plan[seconds:], np.zeros(seconds)))
+
+    def _way(self, steps: int, step: float) -> NDArray[Any]:
+        frame = self._frame
+        gain, rate = frame.roll_gain, math.radians(frame.max_roll_rate_deg)
+        way: NDArray[Any] = roll_out(self._pose, self._plan, 1.0, 0.0, steps, step, gain, rate)
+        return way
 
 
 def mean(flights: Iterable[Flown], figure: str = "hidden") -> float:
@@ -248,7 +296,7 @@ def study(case: Case, options: argparse.Namespace, pool: Any) -> dict[str, Any]:
         name: pool.map(partial(fly, case, guidance, minutes), seeds)
         for name, guidance in chosen.items()
     }
-    if options.bound and case.aircraft == 1:
+    if options.bound:
         flights["known future"] = pool.map(partial(fly_knowing, case, minutes), seeds)
     found = [flight.seconds >= FOUND for flight in flights["carrot"]]
     flights = {name: list(itertools.compress(flown, found)) for name, flown in flights.items()}

@@ -13,6 +13,7 @@ import itertools
 import os
 import time
 from collections.abc import Callable, Sequence
+from typing import Any
 
 # Before NumPy is loaded: one thread each.
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -90,10 +91,10 @@ class Ours:
         return [str(track.id) for track in self._tracks], np.reshape(places, (-1, 2))
 
 
-def rivals_of(swarm: Swarm, seed: int) -> dict[str, Callable[[], object]]:
+def rivals_of(swarm: Swarm, seed: int) -> dict[str, Callable[[], Any]]:
     """Makers of everyone who runs; Stone Soup's only where it is installed."""
     few = OURS.model_copy(update={"particles": FEW})
-    makers: dict[str, Callable[[], object]] = {
+    makers: dict[str, Callable[[], Any]] = {
         MANY_NAME: lambda: Ours(swarm, KNOWN, seed, OURS),
         FEW_NAME: lambda: Ours(swarm, KNOWN, seed, few),
     }
