@@ -35,8 +35,8 @@ lies near its edge, where a slanting look spreads the same noise over some 3 m a
 A third of the noise brings the error to 2.1 m, so the camera is not all of it. One aircraft takes
 two minutes to find one vehicle in 600 m × 600 m, and the longest time out of sight is far beyond
 the 17 steps after which a track is dropped: what the thesis concludes from it, that one aircraft is
-not enough, holds. Whether it tracks the vehicle for more than nine tenths of the time, 50 flights do
-not tell.
+not enough, holds. Whether it tracks the vehicle for more than nine tenths of the time, 50 flights
+do not tell.
 """,
     ),
     "2-partner": (
