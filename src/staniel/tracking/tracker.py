@@ -170,8 +170,7 @@ class Tracker:
         roll = self._roll
         seen, existence = lives.live_on(
             roll.log_odds, roll.unseen, roll.last_seen, rows[:, 9], hits, owners,
-            batch.values[:, 0],
-looks is not None, now > before, self._hit, self._miss,
+            batch.values[:, 0], looks is not None, now > before, self._hit, self._miss,
         )  # fmt: skip
         covariances = rows[:, 4:8].copy()
         if now > before:
