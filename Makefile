@@ -6,7 +6,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help fly test lint bench setup clean
+.PHONY: help fly test lint units bench setup clean
 
 help:   ## say what can be made
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1	\2/p' $(MAKEFILE_LIST)
@@ -14,7 +14,10 @@ help:   ## say what can be made
 fly: $(READY)   ## fly the default mission and draw its movie
 	$(BIN)/staniel fly --movie
 
-test: lint   ## run the checks, then the tests
+test: $(READY)   ## run the checks and the tests, side by side
+	$(MAKE) --jobs=2 lint units
+
+units: $(READY)   ## run the tests alone, a little of every sweep; STANIEL_FULL=1: all of it
 	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(READY)   ## run the checks alone: style, types, import contracts

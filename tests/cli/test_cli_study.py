@@ -10,6 +10,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from staniel.cli import app
+from staniel.studies import workers
 from staniel.terminal import StudyReporter
 
 TEXT = """
@@ -137,6 +138,7 @@ def test_report_is_one_page_with_its_figures(folder):
 )
 def test_mistakes_are_named_and_nothing_is_written(tmp_path, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workers, "CONNECT_WITHIN", 1)
     done = call(*arguments)
     assert done.exit_code == 2
     assert message in done.stderr

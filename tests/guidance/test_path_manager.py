@@ -7,11 +7,13 @@ import pytest
 import shapely
 from flown_paths import AIRFRAME, fly_paths, random_routes, winds_from_all_sides
 
+from amounts import amount
 from staniel.datatypes.belief import Pose
 from staniel.datatypes.command import FlyLine, FlyOrbit
 from staniel.guidance import PathState, dubins_path, follow, waypoint_path
 from staniel.guidance.paths import Arc, Straight
 
+MISSIONS = amount(40, full=100)
 CORNER = [[0.0, 0.0], [200.0, 0.0], [200.0, 200.0]]
 OVER = waypoint_path(CORNER, AIRFRAME)
 
@@ -153,11 +155,11 @@ def along(path, way):
         (7.5, 90.0, "vector-field"),
     ],
 )
-def test_a_hundred_missions_with_fillets_are_flown_as_drawn(wind, radius, following):
+def test_random_missions_with_fillets_are_flown_as_drawn(wind, radius, following):
     """Without wind within 2 m, in half the airspeed within 8; at most 1 % longer than drawn."""
-    routes = random_routes(7, 100)
+    routes = random_routes(7, MISSIONS)
     paths = [waypoint_path(route, AIRFRAME, radius=radius) for route in routes]
-    ways, _ = fly_paths(paths, winds_from_all_sides(100, wind), following=following)
+    ways, _ = fly_paths(paths, winds_from_all_sides(MISSIONS, wind), following=following)
     within = 2.0 if wind == 0.0 else 8.0
     for path, route, way in zip(paths, routes, ways, strict=True):
         off, length = along(path, way)
@@ -172,14 +174,14 @@ def test_a_hundred_missions_with_fillets_are_flown_as_drawn(wind, radius, follow
 
 
 @pytest.mark.parametrize("wind", [0.0, 7.5])
-def test_a_hundred_missions_pass_over_every_waypoint(wind):
-    routes = random_routes(8, 100, sharpest=math.pi)
+def test_random_missions_pass_over_every_waypoint(wind):
+    routes = random_routes(8, MISSIONS, sharpest=math.pi)
     paths = [waypoint_path(route, AIRFRAME) for route in routes]
-    ways, log = fly_paths(paths, winds_from_all_sides(100, wind))
+    ways, log = fly_paths(paths, winds_from_all_sides(MISSIONS, wind))
     for route, way in zip(routes, ways, strict=True):
         flown = shapely.LineString(way[:, :2])
         assert max(flown.distance(shapely.Point(place)) for place in route) < 1.0
-    for i in range(100):
+    for i in range(MISSIONS):
         legs = [states[i].leg for states in log]
         assert legs == sorted(legs)
         assert set(legs) == set(range(len(paths[i].legs) + 1))

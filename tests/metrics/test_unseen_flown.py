@@ -24,7 +24,10 @@ SCENARIOS = {
         "city": {"density": 0.55, "heights": [30.0, 50.0]},
         "camera": {"mount": "nadir", "half_aperture_deg": 75.0},
     },
-    "often missed": {"camera": {"detection_probability": 0.3}},
+    "often missed": {
+        "guidance": {"pursuit": "carrot"},
+        "camera": {"detection_probability": 0.3},
+    },
     "never missed": {"camera": {"detection_probability": 1.0}},
 }
 

@@ -9,7 +9,7 @@ import pytest
 from small_study import TEXT, small
 
 from staniel.errors import StudyError
-from staniel.studies import run
+from staniel.studies import run, workers
 from staniel.studies.results import RESULTS
 
 pytest.importorskip("distributed", reason="needs the extra `cluster`")
@@ -72,7 +72,8 @@ def test_a_cluster_gives_the_same_bytes_as_one_process(scheduler, tmp_path):
     assert set(places) == {str(process.pid) for process in crew}
 
 
-def test_nobody_there(tmp_path):
+def test_nobody_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "CONNECT_WITHIN", 1)
     with pytest.raises(StudyError, match=r"scheduler tcp://127\.0\.0\.1:9: cannot be reached"):
         run(small(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:9")
     with pytest.raises(StudyError, match=r"scheduler nonsense://x: cannot be reached"):

@@ -17,7 +17,7 @@ from small_study import TEXT, written
 from staniel.studies import run
 from staniel.studies.results import RESULTS
 
-KILLS = int(os.environ.get("STANIEL_KILLS", "4"))
+KILLS = int(os.environ.get("STANIEL_KILLS", "2"))
 
 
 def workers_of(process):

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from amounts import amount
 from staniel.datatypes.belief import Sighting, TrackId
 from staniel.tracking import Aliases, Tracker, TrackingConfig
 
+SEEDS = amount(16, full=40)
 R = 2.25 * np.eye(2)
 LIGHT = TrackingConfig(particles=200)
 OLD, YOUNG, YOUNGER = TrackId(2.0, 0, 1), TrackId(2.0, 1, 1), TrackId(5.0, 0, 2)
@@ -142,13 +144,13 @@ def test_the_owner_of_a_sighting_does_not_depend_on_the_order_of_the_call():
 def test_names_agree_in_the_whole_team(agents):
     """No target has two names for more than 50 steps at a stretch, nine in ten for at most 30."""
     runs, ends = [], 0
-    for seed in range(40):
+    for seed in range(SEEDS):
         history, _ = fly(seed, agents)
         runs += disagreements(history)
         ends += agreed(history[-1])
     assert max(runs) <= 50
     assert np.percentile(runs, 90) <= 30
-    assert ends == 40
+    assert ends == SEEDS
 
 
 def test_nobody_cares_in_which_order_agents_step_and_reports_come():

@@ -19,7 +19,7 @@ class Clouds:
     """Arrays of some tracks, and the kernel's long call."""
 
     def __init__(self, state, *, habits=(2.0, 0.0, 0.0, 0.0), keys=None):
-        self.state = np.array(state, np.float32)
+        self.state = np.array(state, np.float32, order="C")
         count, _, n = self.state.shape
         self.count, self.n = count, n
         self.weights = np.full((count, n), 1.0 / n, np.float32)

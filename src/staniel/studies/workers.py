@@ -15,6 +15,10 @@ from staniel.studies.mission import Outcome, Task, fly_task
 __all__ = ["Cluster", "Processes", "WorkerDied", "Workers"]
 
 
+CONNECT_WITHIN = 10
+"""A scheduler that does not answer for so long is not there [s]."""
+
+
 class WorkerDied(Exception):  # noqa: N818 - what happened, to whom is asked for the result
     """The process that flew a run ended before the run did."""
 
@@ -123,7 +127,7 @@ class Cluster:
             ) from error
         dask: Any = distributed  # it has no types
         try:
-            self._client = dask.Client(address, timeout=10, set_as_default=False)
+            self._client = dask.Client(address, timeout=CONNECT_WITHIN, set_as_default=False)
         except (OSError, ValueError, TypeError, ImportError) as error:
             raise StudyError(
                 f"scheduler {address}: cannot be reached ({error}); expected the address of a "
