@@ -23,7 +23,13 @@ from staniel.datatypes.threats import Carrier, Threats
 from staniel.errors import OutputError
 from staniel.recording import Recorder, read_record
 from staniel.recording.encode import FineSteps
-from staniel.recording.schemas import MOST_OFFERS, OPTIONAL_TOPICS, SCHEMAS
+from staniel.recording.schemas import (
+    MOST_OFFERS,
+    ONCE_TOPICS,
+    OPTIONAL_TOPICS,
+    SCHEMAS,
+    TICK_TOPICS,
+)
 
 TICKS = 40
 
@@ -38,13 +44,14 @@ def frames(city):
     return list(synthetic_run.frames(city, TICKS))
 
 
-def record(path, city, frames, complete=True):
+def record(path, city, frames, complete=True, **how):
     with Recorder(
         path,
         scenario=synthetic_run.scenario(),
         version=synthetic_run.VERSION,
         city=city,
         clock=synthetic_run.CLOCK,
+        **how,
     ) as recorder:
         for frame in frames:
             recorder.write(frame)
@@ -367,6 +374,23 @@ def test_the_scene_has_every_building_closed_from_above(path, city):
     assert areas[roofs].sum() == pytest.approx(built, rel=1e-4)
     walls = sum(o.length * h for o, h in zip(city.outlines, city.heights, strict=True))
     assert areas[~roofs].sum() == pytest.approx(walls, rel=1e-4)
+
+
+def test_a_lean_record_says_the_same_but_for_the_scenes(path, tmp_path, city):
+    many = list(synthetic_run.frames(city, 130))  # more than two chunks
+    whole, lean = (
+        record(tmp_path / f"{name}.mcap", city, many, lean=name == "lean")
+        for name in ("whole", "lean")
+    )
+    a, b = read_record(whole), read_record(lean)
+    assert a.complete
+    assert b.complete
+    for name, value in vars(a).items():
+        if isinstance(value, np.ndarray):
+            assert value.tobytes() == getattr(b, name).tobytes()
+    with lean.open("rb") as file:
+        topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+    assert set(ONCE_TOPICS + TICK_TOPICS) <= topics <= set(SCHEMAS) - {"/scene/city", "/scene/team"}
 
 
 def test_an_existing_file_is_refused(path, city):

@@ -24,6 +24,8 @@ _NANOSECONDS: Final = 1_000_000_000
 _CHUNK_LIMIT: Final = 1 << 40
 """No chunk is ever closed for its size: the recorder closes one a tick."""
 
+_LEAN_TICKS: Final = 50  # in a chunk of a lean record
+
 
 class Recorder:
     """Writes one run to an MCAP file that can be read up to its last tick, however it ends.
@@ -44,6 +46,9 @@ class Recorder:
         The true one.
     clock : Clock
         The run's.
+    lean : bool, optional
+        For who reads it back at once: no scenes for viewers, and up to 50 ticks in a chunk, which a
+        kill takes along.
 
     Raises
     ------
@@ -59,8 +64,10 @@ class Recorder:
         version: str,
         city: City,
         clock: Clock,
+        lean: bool = False,
     ) -> None:
         self.path = Path(path)
+        self._lean = lean
         self.ticks = 0
         self._fine = FineSteps(clock)
         self._open = True
@@ -96,7 +103,8 @@ class Recorder:
         }
         self._add("/staniel/scenario", _text(about), 0, 0)
         self._add("/staniel/city", _text(city.to_dict()), 0, 0)
-        self._add("/scene/city", city_scene(city), 0, 0)
+        if not self._lean:
+            self._add("/scene/city", city_scene(city), 0, 0)
         self._writer.flush()
 
     def write(self, frame: Frame) -> None:
@@ -114,11 +122,13 @@ class Recorder:
         tick = frame.truth.tick
         now = round(frame.truth.time * _NANOSECONDS)
         texts = encode_tick(frame, self._fine)
-        texts.append(("/scene/team", team_scene(frame.truth, frame.beliefs, now)))
+        if not self._lean:
+            texts.append(("/scene/team", team_scene(frame.truth, frame.beliefs, now)))
         self._half_written = True
         for topic, text in texts:
             self._add(topic, text, now, tick)
-        self._guarded(self._writer.flush)
+        if not self._lean or self.ticks % _LEAN_TICKS == 0:
+            self._guarded(self._writer.flush)
         self._half_written = False
         self.ticks += 1
 

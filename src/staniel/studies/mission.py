@@ -121,6 +121,7 @@ def _fly(scenario: Scenario) -> list[Row]:
             version=__version__,
             city=city,
             clock=scenario.clock,
+            lean=True,
         ) as recorder:
             for frame in mission.frames():
                 recorder.write(frame)
