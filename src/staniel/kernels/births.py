@@ -1,6 +1,6 @@
 """New targets: peaks on a grid of static particles, and the places that come back (thesis 6.3)."""
 
-from math import exp, floor, sqrt
+from math import exp, floor, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -40,13 +40,25 @@ def _window(
         # A static particle stands for its cell: the cell's extent adds to the covariance.
         sxx, sxy, syy = z[3] + own, z[4], z[5] + own
         det = sxx * syy - sxy * sxy
-        norm = 1.0 / sqrt(det)
+        ixx, ixy, iyy = 0.5 * syy / det, 0.5 * sxy / det, 0.5 * sxx / det
+        norm, west = 1.0 / sqrt(det), (node[0] - reach) * spacing - z[1]
+        # From node to node the exponent changes by what changes evenly: a product does for an exp.
+        turn = exp(-2.0 * ixx * spacing * spacing)
         for b in range(side):
             dy = (node[1] + b - reach) * spacing - z[2]
-            for a in range(side):
-                dx = (node[0] + a - reach) * spacing - z[1]
-                square = (syy * dx * dx - 2.0 * sxy * dx * dy + sxx * dy * dy) / det
-                out[b, a] += norm * exp(-0.5 * square)
+            # From the heaviest of the row outwards, so that nothing is lost that counts.
+            first = min(max(floor((ixy / ixx * dy - west) / spacing + 0.5), 0), side - 1)
+            dx = west + first * spacing
+            heaviest = norm * exp(-dx * (ixx * dx - 2.0 * ixy * dy) - iyy * dy * dy)
+            out[b, first] += heaviest
+            for way in (-1, 1):
+                step = exp(-spacing * (ixx * (2.0 * way * dx + spacing) - 2.0 * ixy * way * dy))
+                value, a = heaviest * step, first + way
+                while 0 <= a < side:
+                    out[b, a] += value
+                    step *= turn
+                    value *= step
+                    a += way
     east, north = reach, reach
     for b in range(side):
         for a in range(side):
@@ -155,22 +167,31 @@ def _compose(place: Array, xx: float, xy: float, yy: float) -> None:
     place[3], place[4], place[5] = iyy / det, -ixy / det, ixx / det
 
 
-@njit(cache=True, error_model="numpy")
-def _share_of_reach(candidate: Array, place: Array, max_speed: float, gate: float) -> float:
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _share_of_reach(
+    candidates: Array, i: int, place: Array, max_speed: float, gate: float
+) -> float:
     """Squared distance of a place from where a candidate is expected, over that of its reach."""
-    base = 6 * int(candidate[0]) - 4
-    last = candidate[base : base + 6]
-    gone = place[0] - last[0]
-    x, y, variance, change = last[1], last[2], last[3] + last[5], max_speed
-    if candidate[0] >= 2.0 and gone > _SAME_TIME:
-        before = candidate[base - 6 : base]
-        share = gone / (last[0] - before[0])
-        vx, vy = (last[1] - before[1]) / gone * share, (last[2] - before[2]) / gone * share
+    # By numbers and not by views of rows, each of which would be counted as a reference.
+    hits = candidates[i, 0]
+    t = 6 * int(hits) - 4
+    x, y = candidates[i, t + 1], candidates[i, t + 2]
+    variance, change = candidates[i, t + 3] + candidates[i, t + 5], max_speed
+    gone = place[0] - candidates[i, t]
+    if hits >= 2.0 and gone > _SAME_TIME:
+        share = gone / (candidates[i, t] - candidates[i, t - 6])
+        vx = (x - candidates[i, t - 5]) / gone * share
+        vy = (y - candidates[i, t - 4]) / gone * share
         x, y = x + vx * gone, y + vy * gone
-        variance = (1.0 + share) ** 2 * variance + share * share * (before[3] + before[5])
+        before = candidates[i, t - 3] + candidates[i, t - 1]
+        variance = (1.0 + share) ** 2 * variance + share * share * before
         change = min(max_speed, _CHANGE + _TURN * sqrt(vx * vx + vy * vy))
-    reach = gate * sqrt(variance + place[3] + place[5]) + change * abs(gone)
     dx, dy = place[1] - x, place[2] - y
+    variance += place[3] + place[5]
+    beyond = max(abs(dx), abs(dy)) - change * abs(gone)
+    if beyond > 0.0 and beyond * beyond > gate * gate * variance:
+        return inf  # Most are far away, and a root takes longer than all the rest.
+    reach = gate * sqrt(variance) + change * abs(gone)
     square: float = (dx * dx + dy * dy) / (reach * reach)
     return square
 
@@ -214,7 +235,7 @@ def follow(candidates: Array, places: Array, max_speed: float, gate: float) -> A
         place = places[q]
         best, closest = -1, 1.0
         for i in range(alive):
-            share = _share_of_reach(out[i], place, max_speed, gate)
+            share = _share_of_reach(out, i, place, max_speed, gate)
             if share < closest:
                 best, closest = i, share
         if best < 0:
