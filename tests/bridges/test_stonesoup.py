@@ -247,6 +247,12 @@ def test_says_what_to_install(monkeypatch):
 
 
 def test_its_own_simulation_tracked_here_and_scored_there():
+    """Five found, 2 m off or so; in the mean of three, since its sets have no order."""
+    assert np.mean([simulated_and_scored(seed) for seed in (3, 13, 23)]) < 6.0
+
+
+def simulated_and_scored(first):
+    """Mean GOSPA from the tenth step on, the same by both."""
     truth = MultiTargetGroundTruthSimulator(
         transition_model=CombinedLinearGaussianTransitionModel(
             [ConstantVelocity(0.02, seed=1)] * 2
@@ -258,15 +264,15 @@ def test_its_own_simulation_tracked_here_and_scored_there():
         birth_rate=0.0,
         death_probability=0.0,
         initial_number_targets=5,
-        seed=3,
+        seed=first,
     )
     sensor = SimpleDetectionSimulator(
         groundtruth=truth,
-        measurement_model=LinearGaussian(4, (0, 2), 2.25 * np.eye(2), seed=5),
+        measurement_model=LinearGaussian(4, (0, 2), 2.25 * np.eye(2), seed=first + 2),
         meas_range=np.array([[-100.0, 500.0], [-100.0, 500.0]]),
         detection_probability=0.9,
         clutter_rate=2.0,
-        seed=4,
+        seed=first + 1,
     )
     config = TrackingConfig(
         view_probability=1.0, unseen_limit=5, clutter_density=sensor.clutter_spatial_density
@@ -288,4 +294,4 @@ def test_its_own_simulation_tracked_here_and_scored_there():
     metrics = manager.generate_metrics()["gospa_generator"]["GOSPA Metrics"].value
     theirs = [metric.value["distance"] for metric in metrics]
     assert theirs == pytest.approx(ours, rel=1e-9)
-    assert np.mean(theirs[10:]) < 6.0  # five found, 2 m off or so
+    return np.mean(theirs[10:])

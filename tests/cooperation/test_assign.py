@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
@@ -88,6 +88,7 @@ def test_forbidden_pairs_are_left_out_and_most_rows_served(cost, epsilon):
 
 @settings(deadline=None, max_examples=200)
 @given(matrices(REALS), st.floats(0.01, 500.0))
+@example(np.array([[1e-6, 0.0], [0.0, 0.0]]), 1.0)
 def test_a_step_bounds_what_is_lost(cost, epsilon):
     check(cost, assign(cost, epsilon), epsilon)
 

@@ -110,7 +110,9 @@ def assign(cost: ArrayLike, epsilon: float | None = None) -> Assignment:
         largest = max(largest, barred)
     if step < _FINEST * largest:
         step = 0.0
-    return Assignment(*auction.assign(costs, step, barred, _ROUNDING * max(n, m) * largest))
+    # Prices are multiples of the step, however small the costs.
+    rounding = _ROUNDING * max(n, m) * max(largest, step)
+    return Assignment(*auction.assign(costs, step, barred, rounding))
 
 
 def _checked(cost: ArrayLike) -> NDArray[np.float64]:
