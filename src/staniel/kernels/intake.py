@@ -69,4 +69,4 @@ def arranged(
 
 def warm() -> None:
     """Compile, or load from the cache, what is called from Python in a flight."""
-    arranged(np.frombuffer(bytes(56)).reshape(-1, 7), 0.0, 1.0, 1.0)
+    arranged(np.frombuffer(bytearray(56)).reshape(-1, 7), 0.0, 1.0, 1.0)

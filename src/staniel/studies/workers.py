@@ -12,8 +12,7 @@ from staniel._version import __version__
 from staniel.errors import StudyError
 from staniel.studies.mission import Outcome, Task, fly_task
 
-__all__ = ["Cluster", "Processes", "WorkerDied", "Workers"]
-
+__all__ = ["CONNECT_WITHIN", "Cluster", "Processes", "WorkerDied", "Workers"]
 
 CONNECT_WITHIN = 10
 """A scheduler that does not answer for so long is not there [s]."""
