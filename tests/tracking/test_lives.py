@@ -22,9 +22,11 @@ def test_a_step_of_all_tracks(count, sightings, told, moved, seed):
     last, evidence = g.uniform(0.0, 9.0, count), g.normal(0.0, 3.0, count)
     hits, owners = g.integers(0, 3, count), g.integers(-1, count, sightings)
     times = g.uniform(5.0, 10.0, sightings)
+    rows, values = np.zeros((count, 10)), np.zeros((sightings, 6))
+    rows[:, 9], values[:, 0] = evidence, times
     new_odds, new_unseen, new_last = odds.copy(), unseen.copy(), last.copy()
     seen, existence = live_on(
-        new_odds, new_unseen, new_last, evidence, hits, owners, times, told, moved, HIT, MISS
+        new_odds, new_unseen, new_last, rows, hits, owners, values, told, moved, HIT, MISS
     )
     for k in range(count):
         own = times[owners == k].tolist()

@@ -22,10 +22,10 @@ def live_on(
     log_odds: Array,
     unseen: Array,
     last_seen: Array,
-    evidence: Array,
+    rows: Array,
     hits: Array,
     owners: Array,
-    times: Array,
+    sightings: Array,
     told: bool,
     moved: bool,
     hit: float,
@@ -41,16 +41,18 @@ def live_on(
         Steps since a sighting.
     last_seen : (n,) float64 array [s]
         Time of the newest sighting.
-    evidence : (n,) float64 array
-        Log of the likelihood of all that was seen and missed, without `hit`.
+    rows : (n, 10) float64 array
+        As `staniel.kernels.particles.settle` gives them. The last column, the log of how likely all
+        is that was seen and missed, is without `hit`.
     hits : (n,) int64 array
         Looks that showed the track.
     owners : (m,) int64 array
         Track that each sighting belongs to; less than 0: none.
-    times : (m,) float64 array [s]
-        Of the sightings.
+    sightings : (m, 6) float64 array
+        The first column is their time [s]. Whole arrays are taken, since a column of a single row
+        is of another type to Numba than one of several.
     told : bool
-        Somebody said what was looked at: `evidence` counts without a hit, too.
+        Somebody said what was looked at: the likelihood counts without a hit, too.
     moved : bool
         Time has passed since the last step.
     hit, miss : float
@@ -70,10 +72,10 @@ def live_on(
         k = owners[j]
         if k >= 0:
             seen[k] = True
-            last_seen[k] = max(last_seen[k], times[j])
+            last_seen[k] = max(last_seen[k], sightings[j, 0])
     for k in range(count):
         if hits[k] > 0 or told:
-            log_odds[k] += evidence[k] + hits[k] * hit
+            log_odds[k] += rows[k, 9] + hits[k] * hit
         elif moved:
             log_odds[k] += miss
         log_odds[k] = min(log_odds[k], _MOST)
@@ -126,7 +128,6 @@ def warm() -> None:
     odds, unseen, hits = np.zeros(1), np.zeros(1, np.int64), np.ones(1, np.int64)
     rows, values = np.zeros((1, 10)), np.zeros((1, 6))
     _, existence = live_on(
-        odds, unseen, odds.copy(), rows[:, 9], hits, np.zeros(1, np.int64), values[:, 0], True,
-        True, 1.0, -1.0,
+        odds, unseen, odds.copy(), rows, hits, np.zeros(1, np.int64), values, True, True, 1.0, -1.0,
     )  # fmt: skip
     ended(unseen, existence, rows[:, 4:8].copy(), 17, 0.01, 30.0)

@@ -169,8 +169,8 @@ class Tracker:
         rows = bank.settle()
         roll = self._roll
         seen, existence = lives.live_on(
-            roll.log_odds, roll.unseen, roll.last_seen, rows[:, 9], hits, owners,
-            batch.values[:, 0], looks is not None, now > before, self._hit, self._miss,
+            roll.log_odds, roll.unseen, roll.last_seen, rows, hits, owners, batch.values,
+            looks is not None, now > before, self._hit, self._miss,
         )  # fmt: skip
         covariances = rows[:, 4:8].copy()
         if now > before:
