@@ -43,7 +43,7 @@ do not tell.
         (YES, YES, YES),
         """
 A second aircraft that nobody asks for help, and that searches until it holds a target itself,
-still reports what it sees. That is worth five points of the time in sight and cuts the longest
+still reports what it sees. That is worth four to five points of the time in sight and cuts the longest
 time out of sight nearly to half; and two find the vehicle a minute sooner.
 """,
     ),
@@ -51,7 +51,7 @@ time out of sight nearly to half; and two find the vehicle a minute sooner.
         (YES, NO),
         """
 That buildings hide the vehicle is confirmed: from a tenth of the ground to seven tenths the time
-in sight falls from 59 % to 15 %, and the longest time out of sight grows eightfold. That the
+in sight falls from 59 % to 14 %, and the longest time out of sight grows eightfold. That the
 densest city traps the vehicle and so raises the time in sight again is not: from 0.7 to 0.75 it
 stays what it is, far below what 0.6 allows.
 """,
@@ -61,7 +61,7 @@ stays what it is, far below what 0.6 allows.
         """
 A vehicle faster than the aircraft is lost, as the thesis says: at a ratio of 1 it is tracked for a
 quarter of the time. It goes step by step: up to 0.3 the vehicle is tracked for seven tenths of the
-time and more, at 0.5 for half of it. The time in sight falls from 42 % to 15 %, and the vehicle
+time and more, at 0.5 for half of it. The time in sight falls from 42 % to 13 %, and the vehicle
 changes its name twice or three times a run from 0.7 on, hardly ever up to 0.3.
 """,
     ),
@@ -71,7 +71,7 @@ changes its name twice or three times a run from 0.7 on, hardly ever up to 0.3.
 Without explicit cooperation every further aircraft adds a little to the time in sight, by what it
 happens to see on its own way; that the second adds more than the third is not shown. With it, the
 second aircraft joins the one that holds the vehicle, and that is the thesis' picture: the second
-cuts the time out of sight from 302 s to 186 s, all the four after it only to 157 s. The same second
+cuts the time out of sight from 301 s to 188 s, all the four after it only to 149 s. The same second
 aircraft without being asked leaves it at 304 s, for it finds the vehicle sooner and then watches
 the rest of the city.
 """,
