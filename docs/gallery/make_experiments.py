@@ -43,8 +43,8 @@ do not tell.
         (YES, YES, YES),
         """
 A second aircraft that nobody asks for help, and that searches until it holds a target itself,
-still reports what it sees. That is worth four to five points of the time in sight and cuts the longest
-time out of sight nearly to half; and two find the vehicle a minute sooner.
+still reports what it sees. That is worth four to five points of the time in sight and cuts the
+longest time out of sight nearly to half; and two find the vehicle a minute sooner.
 """,
     ),
     "3-density": (
