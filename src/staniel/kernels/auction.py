@@ -234,20 +234,41 @@ def optimal(cost: Array) -> tuple[Array, Array]:
     return columns, prices
 
 
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "nsz"})
+def _cheapest(costs: Array, prices: Array) -> float:
+    """What the cheapest column of a row costs in all; without a branch, in vectors."""
+    best = np.inf
+    for j in range(costs.size):
+        best = min(best, costs[j] + prices[j])
+    return best
+
+
+@njit(cache=True, error_model="numpy", fastmath={"nnan", "nsz"})
+def _range(flat: Array) -> tuple[float, float]:
+    """Least and greatest finite one of some costs without NaN and -inf."""
+    low, high = np.inf, -np.inf
+    for k in range(flat.size):
+        value = flat[k]
+        low = min(low, value)
+        high = max(high, value if value < np.inf else -np.inf)
+    return low, high
+
+
 @njit(cache=True, error_model="numpy")
 def survey(cost: Array) -> tuple[float, float, int, int]:
     """Least and greatest finite cost, how many are +inf, and the first that is no cost, or -1."""
-    low, high, forbidden = np.inf, -np.inf, 0
     flat = cost.ravel()
+    forbidden, good = 0, 0
     for k in range(flat.size):
-        value = flat[k]
-        if value == np.inf:
-            forbidden += 1
-        elif value > -np.inf:
-            low, high = min(low, value), max(high, value)
-        else:
-            return low, high, forbidden, k
-    return low, high, forbidden, -1
+        forbidden += flat[k] == np.inf
+        good += flat[k] > -np.inf
+    wrong = -1
+    if good < flat.size:
+        wrong = 0
+        while flat[wrong] > -np.inf:
+            wrong += 1
+    low, high = _range(flat[:wrong] if wrong >= 0 else flat)
+    return low, high, forbidden, wrong
 
 
 @njit(cache=True, error_model="numpy")
@@ -310,7 +331,7 @@ def assign(
             columns[i] = NOBODY
         elif j != NOBODY:
             total += cost[i, j]
-            best = _best_two(cost[i], prices)[1]
+            best = _cheapest(cost[i], prices)
             happy[i] = cost[i, j] + prices[j] <= best + epsilon + rounding
     return columns, prices, happy, total
 
