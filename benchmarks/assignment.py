@@ -201,7 +201,7 @@ def bundles(cost: Floats, air: Air) -> Outcome:
 
 
 def auctions(rule: str) -> Mode:
-    """The team's own protocol: agent i finds target i; nothing is handed over afterwards."""
+    """The team's own protocol: agent i finds target i, and tracks what it holds; no hand-overs."""
     config = CooperationConfig(award=rule, handover_margin=1e9, unheld_memory=1e9)
 
     def mode(cost: Floats, air: Air) -> Outcome:
@@ -217,8 +217,13 @@ def auctions(rule: str) -> Mode:
         for k in range(LIMIT):
             now, said = float(k), []
             for i, agent in enumerate(team):
-                task = Task(names[i], (far * i, 0.0), 0.0, rows[i][i], True, last_seen=now)
-                words = agent.step(now, POSE, [task], air.inboxes[i], priced(rows[i]))
+                holding = agent.holding
+                known = {i} if holding is None else {i, holding.id.founder}
+                tasks = [
+                    Task(names[j], (far * j, 0.0), 0.0, rows[i][j], j == i, last_seen=now)
+                    for j in known
+                ]
+                words = agent.step(now, POSE, tasks, air.inboxes[i], priced(rows[i]))
                 beat = agent.heartbeat("search", (0.0, 0.0))
                 said += [(i, word) for word in words]
                 air.beats += 1

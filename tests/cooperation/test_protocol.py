@@ -3,9 +3,11 @@
 import itertools
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linear_sum_assignment
 
 from staniel.cooperation import CooperationConfig
 from staniel.datatypes.belief import TrackId
@@ -277,3 +279,72 @@ def test_an_awarded_auction_goes_on_when_another_announces_the_target():
     bus.run(3)
     assert ledger.auctions[name].award == award
     assert ledger.auctions[name].tries == 2
+
+
+# -- several auctions at once ----------------------------------------------------------------------
+
+SPREAD = [(60.0 * k, 170.0 * (k % 3), 0.5 * k) for k in range(5)]
+FOUND = [(250.0 - 55.0 * k, 90.0 * k) for k in range(5)]
+
+
+def found_at_once(script=None):
+    """Five agents; each has just found one target that the others know nothing of."""
+    names = {(agent, k): TrackId(0.0, k, 1) for agent in range(5) for k in range(5)}
+    seers = {k: {k} for k in range(5)}
+    bus = Scripted(SPREAD, FOUND, script or {}, seers=seers, names=names)
+    bus.trackers = seers
+    return bus
+
+
+def holders_of(bus):
+    return [bus.holders(k) for k in range(5)]
+
+
+def least(bus):
+    costs = np.array([[bus.cost(agent, k) for k in range(5)] for agent in range(5)])
+    agents, targets = linear_sum_assignment(costs)
+    return [[int(agents[targets == k][0])] for k in range(5)]
+
+
+def test_of_auctions_that_end_together_the_highest_auctioneer_settles_all():
+    bus = found_at_once().run(4)
+    assert {m.sender for m in bus.said(Award)} == {4}
+    assert len(bus.said(Award)) == 5
+    assert holders_of(bus) == least(bus)
+
+
+def test_a_bid_that_does_not_reach_the_others_makes_no_difference():
+    lost = {2: [(a, b) for a, b in links(5) if b != 4]}
+    bus = found_at_once(lost).run(4)
+    assert holders_of(bus) == least(bus)
+
+
+def test_who_does_not_hear_the_leader_awards_a_step_later_itself():
+    """Nobody hears agent 4 from its bid on: all others take the first of those left for leader."""
+    silent = {tick: [(4, k) for k in range(4)] for tick in range(2, 40)}
+    bus = found_at_once(silent)
+    said = {}
+    for _ in range(12):
+        bus.tick()
+        bus.trackers = {k: {k, *agents} for k, agents in enumerate(holders_of(bus))}
+        for m in bus.log:
+            if isinstance(m, Award) and m.sender != 4:
+                said.setdefault(m.sender, bus.time)
+        bus.log.clear()
+    assert set(said.values()) == {4.0}  # at 3 they waited for the word of agent 4
+    held = [[agent for agent in agents if agent != 4] for agents in holders_of(bus)]
+    assert sorted(itertools.chain(*held)) == [0, 1, 2, 3]
+    assert max(map(len, held)) == 1
+
+
+def test_the_auctioneer_repeats_what_the_leader_awarded():
+    """The leader's award does not reach its winner; who announced the target says it again."""
+    winner, target = next((h[0], k) for k, h in enumerate(least(found_at_once())) if h != [k])
+    assert target != 4
+    bus = found_at_once({3: [(4, winner)]}).run(5)
+    again = [m for m in bus.said(Award) if m.target == bus.names[target, target]]
+    assert [m.sender for m in again] == [4, target]
+    assert (again[0].winner, again[0].cost, again[0].bids) == (
+        again[1].winner, again[1].cost, again[1].bids,
+    )  # fmt: skip
+    assert holders_of(bus.run(1)) == least(bus)

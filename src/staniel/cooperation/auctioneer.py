@@ -1,14 +1,15 @@
 """An agent's own auctions: it opens them, awards them, and says so until the winner answers."""
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
-from staniel.cooperation.awarding import best_for_all, lowest, offers_of
+from staniel.cooperation.awarding import Offers, best_for_all, lowest, offers_of
 from staniel.cooperation.cost import Goal, Price, Prices
 from staniel.cooperation.ledger import Ledger
 from staniel.cooperation.table import Auction, Lease
 from staniel.datatypes.belief import TrackId
-from staniel.datatypes.message import Announce, Award, Bid, Offer
+from staniel.datatypes.message import Announce, Award, Offer, Point
 
 __all__ = ["BIDS_TOLD", "Auctioneer"]
 
@@ -96,97 +97,140 @@ class Auctioneer:
 
     def tend(self) -> None:
         """Go on with the auctions whose time is up: award, say the award again, or end them."""
-        ledger = self._ledger
+        ledger, due = self._ledger, []
         for target, auction in list(ledger.auctions.items()):
-            if ledger.time < auction.closes or target not in ledger.auctions:
+            if ledger.time < auction.closes:
                 continue
             if auction.award is None:
-                self._close(target, auction)
+                due.append(target)
             elif auction.tries < ledger.config.award_tries:
                 self._repeat(auction, auction.award)
             else:
                 # Whoever won it does not answer: as if it had never been awarded.
                 ledger.leases.pop(auction.award.winner, None)
                 del ledger.auctions[target]
+        if due and ledger.config.award == "lowest":
+            for target in due:
+                offers = self._offers((target,))[target]
+                self._close(target, lowest(offers), offers)
+        elif due:
+            self._close_jointly(due)
 
-    def _close(self, target: TrackId, auction: Auction) -> None:
-        """Award it, if anybody wants it."""
+    def _close_jointly(self, due: list[TrackId]) -> None:
+        """Settle all open auctions at once: for all as the leader, or for who has none.
+
+        Where several auctions end together the auctioneer of the highest id settles them all. So
+        one table counts, and a bid that did not reach everybody makes no difference. The others
+        wait a step for its word, and then award what it did not.
+        """
         ledger = self._ledger
-        busy = set(ledger.leases) | auction.declined
-        bids = [bid for _, bid in ledger.bids if bid.sender not in busy]
-        offers = self._offers(target, auction, bids)
-        joint = ledger.config.award != "lowest"
-        winner = self._joint(target, offers, bids) if joint else lowest(offers)
+        others = self._others_due()
+        lead = max((message.sender for message in others.values()), default=-1)
+        if ledger.agent < lead:
+            late = ledger.time - ledger.bid_time / ledger.config.bid_wait
+            due = [k for k in due if self._is_own(k) or ledger.auctions[k].closes <= late]
+        if not due:
+            return
+        offers = self._offers((*ledger.auctions, *ledger.elsewhere))
+        winners = best_for_all(offers)
+        for target in due:
+            self._close(target, winners.get(target), offers[target])
+        if ledger.agent > lead:
+            for target, message in others.items():
+                if target in winners:
+                    self._close_for_other(message, winners[target], offers[target])
+
+    def _others_due(self) -> dict[TrackId, Announce]:
+        """Auctions of others whose bids are in, but for those of targets that are held."""
+        ledger = self._ledger
+        opened, held = ledger.time - ledger.bid_time, ledger.held
+        return {
+            target: message
+            for target, (message, _) in ledger.elsewhere.items()
+            if message.time <= opened and target not in held
+        }
+
+    def _is_own(self, target: TrackId) -> bool:
+        """Whether nobody else can settle an own auction: the target has a holder to ask."""
+        holding = self._ledger.holding
+        held = holding is not None and holding.id == target
+        return held or self._ledger.auctions[target].holder is not None
+
+    def _close(self, target: TrackId, winner: Offer | None, offers: Offers) -> None:
+        """Award an own auction, if anybody wants it."""
+        ledger = self._ledger
+        auction = ledger.auctions[target]
         if winner is None:
             del ledger.auctions[target]
             free = any(beat.is_free for beat in ledger.beats.values())
             pause = 2.0 * ledger.bid_time if free else UNSOLD_PAUSE
             ledger.paused[target] = ledger.time + pause
             return
-        award = self._award(target, auction, winner, offers)
+        task = ledger.tasks.get(target)
+        position = auction.goal.position if task is None else task.position
+        award = self._award(target, position, winner, offers)
         if winner.bidder == ledger.agent:
             del ledger.auctions[target]
-            if ledger.holding is not None:
-                ledger.let_go()
-            ledger.hold(target, award.position)
         else:
             auction.award, auction.tries = award, 1
             auction.closes = ledger.time + ledger.bid_time
-            ledger.leases[winner.bidder] = Lease(target, winner.cost, ledger.time)
-            ledger.unheld.drop((target,))
 
-    def _offers(self, target: TrackId, auction: Auction, bids: list[Bid]) -> dict[int, Offer]:
-        """What counts of the bids for a target, and of the agent's own price, by bidder."""
+    def _close_for_other(self, message: Announce, winner: Offer, offers: Offers) -> None:
+        """Award an auction of another, who says so again until the winner answers."""
+        ledger, target = self._ledger, message.target
+        del ledger.elsewhere[target]
+        if winner.bidder == ledger.agent:
+            ledger.rename(ledger.own_name(target, message.position), target)
+        self._award(target, message.position, winner, offers)
+
+    def _offers(self, targets: Collection[TrackId]) -> dict[TrackId, dict[int, Offer]]:
+        """What counts of the bids for open auctions, and of the auctioneers' own prices."""
         ledger = self._ledger
-        offers = offers_of(target, bids)
-        offers.pop(ledger.agent, None)
-        if ledger.able:
-            task = ledger.tasks.get(target)
-            own = auction.price if task is None else task.price
-            offers[ledger.agent] = Offer(ledger.agent, *own)
-        holder = None if auction.holder is None else ledger.leases.get(auction.holder)
-        if holder is not None:
-            limit = holder.cost - ledger.config.handover_margin
-            offers = {k: offer for k, offer in offers.items() if offer.cost < limit}
+        agent, able, leases = ledger.agent, ledger.able, ledger.leases
+        bids = [bid for _, bid in ledger.bids if bid.sender not in leases]
+        offers = offers_of(targets, [bid for bid in bids if able or bid.sender != agent])
+        for target, bidders in offers.items():
+            auction = ledger.auctions.get(target)
+            if auction is None:
+                message = ledger.elsewhere[target][0]
+                if math.isfinite(message.cost) and message.sender not in leases:
+                    bidders[message.sender] = Offer(message.sender, message.cost)
+                continue
+            for declined in auction.declined:
+                bidders.pop(declined, None)
+            if able:
+                task = ledger.tasks.get(target)
+                bidders[agent] = Offer(agent, *(auction.price if task is None else task.price))
+            holder = None if auction.holder is None else leases.get(auction.holder)
+            if holder is not None:
+                limit = holder.cost - ledger.config.handover_margin
+                offers[target] = {k: offer for k, offer in bidders.items() if offer.cost < limit}
         return offers
 
-    def _award(
-        self, target: TrackId, auction: Auction, winner: Offer, offers: dict[int, Offer]
-    ) -> Award:
-        """Say who gets it, and the bids that this comes from."""
+    def _award(self, target: TrackId, position: Point, winner: Offer, offers: Offers) -> Award:
+        """Say who gets it, and the bids that this comes from, and act on it."""
         ledger = self._ledger
-        task = ledger.tasks.get(target)
         told = sorted(
             offers.values(), key=lambda offer: (offer != winner, offer.cost, -offer.bidder)
         )[:BIDS_TOLD]
         ledger.say(
             Award,
             target=target,
-            position=auction.goal.position if task is None else task.position,
+            position=position,
             winner=winner.bidder,
             cost=winner.cost,
             bids=tuple(told),
         )
         award = ledger.outbox[-1]
         assert isinstance(award, Award)
+        if winner.bidder == ledger.agent:
+            if ledger.holding is not None:
+                ledger.let_go()
+            ledger.hold(target, position)
+        else:
+            ledger.leases[winner.bidder] = Lease(target, winner.cost, ledger.time)
+            ledger.unheld.drop((target,))
         return award
-
-    def _joint(self, target: TrackId, offers: dict[int, Offer], bids: list[Bid]) -> Offer | None:
-        """Who gets it where all open auctions that the agent hears of are settled at once."""
-        ledger, able = self._ledger, self._ledger.able
-        own = {
-            name: Offer(ledger.agent, task.cost, task.terms)
-            for name, auction in ledger.auctions.items()
-            if able and auction.award is None and (task := ledger.tasks.get(name)) is not None
-        }
-        if ledger.agent in offers:
-            own[target] = offers[ledger.agent]
-        for name, (said, _) in ledger.elsewhere.items():
-            if math.isfinite(said.cost) and said.sender not in ledger.leases:
-                own[name] = Offer(said.sender, said.cost)
-        auctions = {name for name, other in ledger.auctions.items() if other.award is None}
-        others = (auctions | set(ledger.elsewhere)) - {target}
-        return best_for_all(target, offers, others, bids, own)
 
     def _repeat(self, auction: Auction, award: Award) -> None:
         ledger = self._ledger

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from staniel.cooperation.ledger import Ledger
 from staniel.cooperation.table import Holding, Lease
@@ -68,6 +69,7 @@ class Hearing:
                 self._hear_revoke(message)
             case Handover():
                 auctions = self._ledger.auctions
+                self._ledger.elsewhere.pop(message.target, None)
                 if message.auctioneer == self._ledger.agent and message.target in auctions:
                     auctions[message.target].holder = message.sender
                     self._lease(message, message.held_as, message.cost)
@@ -133,9 +135,18 @@ class Hearing:
 
     def _hear_award(self, message: Award) -> None:
         ledger, target, winner = self._ledger, message.target, message.winner
+        ledger.elsewhere.pop(target, None)
         if winner == ledger.agent:
             return  # See `_take`.
-        ledger.auctions.pop(target, None)
+        auction = ledger.auctions.get(target)
+        if auction is not None and auction.award is None and message.sender not in (
+            winner, self._centre
+        ):  # fmt: skip
+            # Awarded by who settled it with others: to be said again until the winner answers.
+            auction.award, auction.tries = replace(message, sender=ledger.agent), 1
+            auction.closes = message.time + ledger.bid_time
+        else:
+            ledger.auctions.pop(target, None)
         self._lease(message, target, message.cost, winner)
         if message.sender == self._centre and ledger.holding is not None:
             own = ledger.own_name(target, message.position)
@@ -154,6 +165,7 @@ class Hearing:
                     if ledger.holding is not None and ledger.holding.id != award.target:
                         ledger.let_go()
                     ledger.hold(award.target, award.position)
+                ledger.auctions.pop(award.target, None)
                 wanted = award.target
                 ledger.say(Acknowledge, target=award.target, auctioneer=award.sender)
             else:
@@ -165,6 +177,7 @@ class Hearing:
 
     def _hear_revoke(self, message: Revoke) -> None:
         ledger = self._ledger
+        ledger.elsewhere.pop(message.target, None)
         if message.auctioneer == ledger.agent:
             ledger.auctions.pop(message.target, None)
             self._lease(message, message.held_as, message.cost)

@@ -192,9 +192,9 @@ class Ledger:
         # What goes by another name by now is not without a holder, or is told under that name.
         self._trails.note(self.time, self.tasks.values())
         speeds = {task.id: math.hypot(*task.velocity) for task in self.tasks.values()}
-        for unheld in self.unheld.all:
-            if unheld.target not in self.tasks and self._trails.explains(unheld, speeds):
-                self.unheld.bury(unheld.target, self.time)
+        strange = [unheld for unheld in self.unheld.all if unheld.target not in self.tasks]
+        for unheld in self._trails.explained(strange, speeds):
+            self.unheld.bury(unheld.target, self.time)
 
     # -- names -----------------------------------------------------------------------------------
 

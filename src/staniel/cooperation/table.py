@@ -105,6 +105,8 @@ class UnheldTable:
         self._memory = memory
         self._entries: dict[TrackId, _Entry] = {}
         self._gone: dict[TrackId, float] = {}
+        self._sorted: list[Unheld] | None = None  # until something changes
+        self._known: tuple[Unheld, ...] = ()  # what was heard last: most tell of the same
 
     def __contains__(self, target: TrackId) -> bool:
         return target in self._entries
@@ -121,8 +123,10 @@ class UnheldTable:
     @property
     def all(self) -> list[Unheld]:
         """All of them, the longest unseen first."""
-        known = [entry.known for entry in self._entries.values()]
-        return sorted(known, key=lambda unheld: (unheld.seen, unheld.target))
+        if self._sorted is None:
+            known = [entry.known for entry in self._entries.values()]
+            self._sorted = sorted(known, key=lambda unheld: (unheld.seen, unheld.target))
+        return list(self._sorted)
 
     @property
     def told(self) -> tuple[Unheld, ...]:
@@ -139,13 +143,18 @@ class UnheldTable:
             self._entries[target] = _Entry(unheld, time)
         elif unheld.seen > entry.known.seen:
             self._entries[target] = _Entry(unheld, entry.since)
+        else:
+            return
+        self._sorted = None
 
     def is_buried(self, unheld: Unheld) -> bool:
         """Whether it was looked for in vain, or goes by another name, since it was seen."""
         return unheld.seen <= self._gone.get(unheld.target, -math.inf)
 
-    def hear(self, told: Iterable[Unheld], time: float) -> list[Unheld]:
+    def hear(self, told: tuple[Unheld, ...], time: float) -> list[Unheld]:
         """Take in what another agent says nobody holds; those that are buried come back."""
+        if told == self._known:
+            return []
         wrong, entries = [], self._entries
         for unheld in told:
             entry = entries.get(unheld.target)
@@ -155,6 +164,7 @@ class UnheldTable:
                 wrong.append(unheld)
             else:
                 self.note(unheld, time)
+        self._known = () if wrong else told
         return wrong
 
     def hear_release(self, message: Release, time: float) -> None:
@@ -172,10 +182,12 @@ class UnheldTable:
     def drop(self, targets: Iterable[TrackId]) -> None:
         """Somebody holds these, or they go by another name."""
         for target in targets:
-            self._entries.pop(target, None)
+            if self._entries.pop(target, None) is not None:
+                self._sorted, self._known = None, ()
 
     def forget(self, time: float) -> None:
         """Drop what nobody has seen for too long by `time` [s]."""
         oldest = time - self._memory
-        self._entries = {k: v for k, v in self._entries.items() if v.known.seen >= oldest}
+        for entry in [e for e in self._entries.values() if e.known.seen < oldest]:
+            self.drop((entry.known.target,))
         self._gone = {k: v for k, v in self._gone.items() if v >= oldest}

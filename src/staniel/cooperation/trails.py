@@ -51,25 +51,31 @@ class Trails:
         moved = {new: trails.pop(old) for old, new in ((one, other), (other, one)) if old in trails}
         trails.update(moved)
 
-    def explains(self, unheld: Unheld, speeds: dict[TrackId, float]) -> bool:
-        """Whether one of the tracks is that target under another name.
+    def explained(self, words: Iterable[Unheld], speeds: dict[TrackId, float]) -> list[Unheld]:
+        """Of which targets one of the tracks is the one, under another name.
 
         It was there when the target was seen, or began later where the target can have come to.
 
         Parameters
         ----------
-        unheld : Unheld
+        words : iterable of Unheld
         speeds : dict of TrackId to float [m/s]
             Of the live tracks.
+
+        Returns
+        -------
+        list of Unheld
+            In the order of `words`.
         """
-        for name, (times, places) in self._trails.items():
-            if name == unheld.target:
-                continue
-            k = bisect_left(times, unheld.seen)
-            if k == len(times):
-                continue
-            late = max(times[0] - unheld.seen, 0.0)
-            reach = self._near + late * (speeds.get(name, 0.0) + _SLACK)
-            if math.dist(places[k], unheld.position) <= reach:
-                return True
-        return False
+        near, found = self._near, []
+        for word in words:
+            target, position, _, seen = word
+            for name, (times, places) in self._trails.items():
+                if seen > times[-1] or name == target:
+                    continue
+                late = times[0] - seen
+                reach = near if late <= 0.0 else near + late * (speeds.get(name, 0.0) + _SLACK)
+                if math.dist(places[bisect_left(times, seen)], position) <= reach:
+                    found.append(word)
+                    break
+        return found
