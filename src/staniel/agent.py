@@ -19,6 +19,7 @@ from staniel.cooperation import (
     CooperationConfig,
     CostModel,
     Gate,
+    Glimpse,
     Goal,
     Holding,
     SearchMap,
@@ -134,6 +135,7 @@ class Agent:
             cell=briefing.cooperation.search_cell,
             areas=areas,
         )
+        self._glimpse = Glimpse(briefing.guidance.glimpse_time)
         self._shared_at = -math.inf
         self._refused = 0
         self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
@@ -334,7 +336,7 @@ class Agent:
     def _fly(
         self, percept: Percept, inbox: Sequence[Message], outbox: list[Message]
     ) -> tuple[Command, str, Point]:
-        """Pursue the held target; else help; else loiter where one was lost; else search."""
+        """Pursue the held target; else help; else loiter where one was; else search."""
         time, pose = percept.time, percept.pose
         self._look_around(percept, inbox)
         held = self._allocation.holding
@@ -359,9 +361,13 @@ class Agent:
         if not percept.health.camera:
             place = (pose.x, pose.y) if self.belief.role != "standby" else self.belief.goal
             return self._circle(pose, place), "standby", place
+        role = "patrol" if self._allocation.patrolling else "search"
+        glimpsed = self._glimpsed(percept)
+        if glimpsed is not None and role == "search":
+            self._search.forget_goal()
+            return self._circle(pose, glimpsed), role, glimpsed
         start, goal = self._search.leg(time, pose, self._lost_clouds)
         airframe = self._briefing.airframe
-        role = "patrol" if self._allocation.patrolling else "search"
         return FlyLine(start, goal, airframe.speed, airframe.altitude), role, goal
 
     def _give_up_in_time(
@@ -381,6 +387,16 @@ class Agent:
         if self._tracker_lost(held.id) or time - since > patience:
             outbox.append(self._allocation.give_up())
         self._last_place = (held.position, since)
+
+    def _glimpsed(self, percept: Percept) -> Point | None:
+        """Where the own camera saw something a moment ago that no track has explained since."""
+        near = self._briefing.cooperation.same_target
+        tracks = [(*track.position.tolist(),) for track in self._tracker.estimates]
+        strange = [s for s in percept.sightings if self._tracker.owner_of(s) is None]
+        places = [(*sighting.position.tolist(),) for sighting in strange]
+        strangers = [z for z in places if all(math.dist(z, track) >= near for track in tracks)]
+        self._glimpse.note(percept.time, strangers, tracks)
+        return self._glimpse.place(percept.time)
 
     def _circle(self, pose: Pose, place: Point) -> Command:
         return loiter(pose, place, self._briefing.airframe, self._briefing.guidance)

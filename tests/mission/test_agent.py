@@ -8,7 +8,7 @@ import pytest
 from staniel.agent import Agent, Briefing
 from staniel.city import City
 from staniel.cooperation import CooperationConfig
-from staniel.datatypes.belief import Percept, Pose, Sighting
+from staniel.datatypes.belief import Percept, Pose, Sighting, TrackId
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import FlyBanks, FlyLine, FlyOrbit
 from staniel.datatypes.equipment import Airframe, Camera
@@ -131,6 +131,37 @@ def test_a_lost_target_is_released_its_last_place_circled_and_then_left(holder):
     searching = [k for k, role in roles.items() if role == "search"]
     assert searching[0] - released == pytest.approx(GUIDANCE.recover_time, abs=2.0)
     assert agent.belief.tracks == []
+
+
+def test_a_search_stays_where_it_saw_something_once():
+    agent = agent_of()
+    command, _ = agent.step(percept(1), [])
+    assert isinstance(command, FlyLine)
+    for k in range(2, 30):
+        sightings = [see(2)] if k == 2 else []
+        command, _ = agent.step(percept(k, *sightings), [])
+        assert agent.belief.role == "search"
+        stays = k < 2 + GUIDANCE.glimpse_time
+        if stays:
+            assert math.dist(agent.belief.goal, place(2)) < 10.0
+        assert isinstance(command, FlyOrbit) == stays
+    flies_on = agent_of(guidance=GUIDANCE.model_copy(update={"glimpse_time": 0.0}))
+    command, _ = flies_on.step(percept(2, see(2)), [])
+    assert isinstance(command, FlyLine)
+
+
+def test_what_a_track_explains_is_no_glimpse():
+    """Another aircraft holds it: this one searches on."""
+    agent = agent_of(1)
+    for k in range(1, 14):
+        beat = Heartbeat(
+            0, k, k - 1.0, pose=Pose(0.0, 0.0, 80.0, 0.0, 0.0, 15.0), role="pursue", goal=(0, 0),
+            target=TrackId(0.0, 0, 1), target_position=place(k - 1), cost=0.0,
+        )  # fmt: skip
+        command, _ = agent.step(percept(k, see(k)), [beat])
+    assert len(agent.belief.tracks) == 1
+    assert (agent.belief.role, agent.belief.target) == ("search", None)
+    assert isinstance(command, FlyLine)
 
 
 def test_what_others_saw_becomes_a_track_of_ones_own():

@@ -6,6 +6,7 @@ from staniel.cooperation.auction import Assignment, assign
 from staniel.cooperation.config import Area, CooperationConfig, CostConfig, priority_at
 from staniel.cooperation.cost import CostModel, Goal, Price, Situation
 from staniel.cooperation.gate import Gate
+from staniel.cooperation.glimpse import Glimpse
 from staniel.cooperation.search import SearchMap
 from staniel.cooperation.table import Holding, Task
 
@@ -18,6 +19,7 @@ __all__ = [
     "CostConfig",
     "CostModel",
     "Gate",
+    "Glimpse",
     "Goal",
     "Holding",
     "Price",

@@ -51,6 +51,9 @@ class GuidanceConfig(Config):
     recover_time: float = Field(
         25.0, ge=0.0, description="loiter on a lost target's last place [s]"
     )
+    glimpse_time: float = Field(
+        12.0, ge=0.0, le=600.0, description="loiter where a search saw something once [s]"
+    )
     following: Literal["carrot", "vector-field"] = Field(
         "carrot", description="how the autopilot follows lines and orbits"
     )
