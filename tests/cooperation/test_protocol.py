@@ -337,6 +337,21 @@ def test_who_does_not_hear_the_leader_awards_a_step_later_itself():
     assert max(map(len, held)) == 1
 
 
+def test_an_auction_that_is_awarded_already_keeps_nobody_from_another():
+    """Its winner does not answer; who is left is still free for what is found meanwhile."""
+    bus = Scripted([(0, 0, 0.0), (285, 0, 0.0), (200, -90, 0.0)], [(290, 0), (20, 310)], {})
+    bus.seers = bus.trackers = {0: {0}, 1: {0}}
+    bus.health = {0: "weak"}  # it bids for nothing itself
+    bus.trackers[1] = set()
+    bus.script = {tick: [(0, 1)] for tick in range(3, 12)}  # agent 1 hears of no award
+    bus.run(3)
+    assert [m.winner for m in bus.said(Award)] == [1]
+    bus.trackers[1] = {0}
+    bus.run(3)
+    second = [m for m in bus.said(Award) if m.target == bus.names[0, 1]]
+    assert [m.winner for m in second] == [2]
+
+
 def test_the_auctioneer_repeats_what_the_leader_awarded():
     """The leader's award does not reach its winner; who announced the target says it again."""
     winner, target = next((h[0], k) for k, h in enumerate(least(found_at_once())) if h != [k])

@@ -11,6 +11,7 @@ finder         announces a target that it sees and that nobody is known to hold
 free agent     bids; announces targets that others know and nobody holds, itself
 auctioneer     awards to the lowest bid, ties to the higher id, or by the best assignment of
                all open auctions; says it again until the winner acknowledges it
+leader         of several whose auctions end together that of the highest id: it awards them all
 holder         revokes an auction of its own target, unless the announced cost undercuts its own
                by the hand-over margin: then it holds it until somebody else says he does
 two holders    the one whose cost, both as of the same instant, is higher yields

@@ -131,7 +131,8 @@ class Auctioneer:
             due = [k for k in due if self._is_own(k) or ledger.auctions[k].closes <= late]
         if not due:
             return
-        offers = self._offers((*ledger.auctions, *ledger.elsewhere))
+        open_ = [name for name, auction in ledger.auctions.items() if auction.award is None]
+        offers = self._offers((*open_, *ledger.elsewhere))
         winners = best_for_all(offers)
         for target in due:
             self._close(target, winners.get(target), offers[target])
