@@ -38,7 +38,13 @@ HERE = Path(__file__).resolve().parent
 Floats = NDArray[np.float64]
 Interval = tuple[float, float, float]
 
-ALONE = {"guidance.pursuit": "carrot", "aircraft.count": 1, "vehicles.count": 1}
+# The missions of the figures were chosen as flown without second looks at what a search saw.
+ALONE = {
+    "guidance.pursuit": "carrot",
+    "guidance.glimpse_time": 0.0,
+    "aircraft.count": 1,
+    "vehicles.count": 1,
+}
 DYNAMICS = ("random-controls", "learned", "constant-velocity")
 
 

@@ -22,7 +22,7 @@ def run():
         seed=10,
         minutes=2.5,
         city={"size": [400.0, 400.0]},
-        guidance={"pursuit": "carrot"},
+        guidance={"pursuit": "carrot", "glimpse_time": 0.0},
         faults={"schedule": faults},
         radio={
             "loss": 0.3,

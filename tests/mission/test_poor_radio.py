@@ -77,6 +77,7 @@ def test_the_receptions_name_everyone_who_heard(poor):
 def test_bids_come_in_time_however_slow_the_radio_is(latency, hop):
     """Who is nearer than the finder of a target is awarded it: it was heard before the award."""
     bids = sold = 0
+    waits = []
     for seed in range(4):
         scenario = load_scenario(
             "downtown",
@@ -97,9 +98,12 @@ def test_bids_come_in_time_however_slow_the_radio_is(latency, hop):
                         bids += 1
                     case Award() if (message.sender, message.target) in opened:
                         # Two ticks as by default, and what two hops take beyond a tick each; what
-                        # comes later is the same award said again.
+                        # comes later is the same award said again. A hop more where it waited in
+                        # vain for the word of another, whose auction ended as well.
                         waited = message.time - opened.pop((message.sender, message.target))
-                        assert waited == 2.0 + 2.0 * (hop - 1)
+                        waits.append(waited - 2.0 - 2.0 * (hop - 1))
                         sold += message.winner != message.sender
     assert bids > 0
     assert sold > 0
+    assert set(waits) <= {0.0, float(hop)}
+    assert waits.count(0.0) > len(waits) / 2

@@ -203,7 +203,11 @@ def test_agents_are_briefed_of_what_is_briefed_and_never_of_what_is_carried(dang
 
 
 def test_risk_changes_nobodys_flight(dangerous):
+    """But that of a policy which heeds it, as the look-ahead does."""
+
     def paths(scenario):
+        guidance = scenario.guidance.model_copy(update={"pursuit": "carrot"})
+        scenario = scenario.model_copy(update={"guidance": guidance})
         mission = assemble(scenario, build_city(scenario.city, scenario.seed))
         return np.array([frame.truth.aircraft for frame in mission.frames()])
 

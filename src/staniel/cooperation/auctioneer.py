@@ -121,13 +121,13 @@ class Auctioneer:
 
         Where several auctions end together the auctioneer of the highest id settles them all. So
         one table counts, and a bid that did not reach everybody makes no difference. The others
-        wait a step for its word, and then award what it did not.
+        wait for its word, half as long as for bids, and then award what it did not.
         """
         ledger = self._ledger
         others = self._others_due()
         lead = max((message.sender for message in others.values()), default=-1)
         if ledger.agent < lead:
-            late = ledger.time - ledger.bid_time / ledger.config.bid_wait
+            late = ledger.time - 0.5 * ledger.bid_time
             due = [k for k in due if self._is_own(k) or ledger.auctions[k].closes <= late]
         if not due:
             return
