@@ -128,7 +128,7 @@ class Auctioneer:
         lead = max((message.sender for message in others.values()), default=-1)
         if ledger.agent < lead:
             late = ledger.time - 0.5 * ledger.bid_time
-            due = [k for k in due if self._is_own(k) or ledger.auctions[k].closes <= late]
+            due = [k for k in due if self._has_holder(k) or ledger.auctions[k].closes <= late]
         if not due:
             return
         open_ = [name for name, auction in ledger.auctions.items() if auction.award is None]
@@ -151,8 +151,8 @@ class Auctioneer:
             if message.time <= opened and target not in held
         }
 
-    def _is_own(self, target: TrackId) -> bool:
-        """Whether nobody else can settle an own auction: the target has a holder to ask."""
+    def _has_holder(self, target: TrackId) -> bool:
+        """Whether the target of an own auction has a holder: then nobody else can settle it."""
         holding = self._ledger.holding
         held = holding is not None and holding.id == target
         return held or self._ledger.auctions[target].holder is not None

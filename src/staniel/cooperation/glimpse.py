@@ -17,7 +17,6 @@ NEAR = 20.0
 FASTEST = 10.0
 """... or farther by so much for each second between them [m/s]."""
 
-
 MOST = 3.0
 """Stays at one place, in a row."""
 

@@ -236,7 +236,7 @@ def optimal(cost: Array) -> tuple[Array, Array]:
 
 @njit(cache=True, error_model="numpy", fastmath={"nnan", "nsz"})
 def _cheapest(costs: Array, prices: Array) -> float:
-    """What the cheapest column of a row costs in all; without a branch, in vectors."""
+    """What the cheapest column of a row costs in all, without a branch."""
     best = np.inf
     for j in range(costs.size):
         best = min(best, costs[j] + prices[j])
