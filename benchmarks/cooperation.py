@@ -12,6 +12,7 @@ patrols. `round` times 100 agents that share out 100 new targets.
 """
 
 import argparse
+import gc
 import math
 import sys
 import time
@@ -161,6 +162,7 @@ def one_round(n: int, seed: int, award: str) -> dict[str, float]:
     gates = [Gate(i) for i in range(n)]
     inboxes: list[list[Message]] = [[] for _ in range(n)]
     spent = spoken = bytes_said = 0.0
+    gc.collect()  # what was made before is not the agents' to clear away
     for tick in range(1, 40):
         now, said = float(tick), []
         started = time.process_time()

@@ -230,7 +230,7 @@ class Auctioneer:
             ledger.hold(target, position)
         else:
             ledger.leases[winner.bidder] = Lease(target, winner.cost, ledger.time)
-            ledger.unheld.drop((target,))
+            ledger.unheld.drop(target)
         return award
 
     def _repeat(self, auction: Auction, award: Award) -> None:

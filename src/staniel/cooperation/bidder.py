@@ -1,10 +1,10 @@
 """What an agent answers to the auctions of others: it revokes, consents, or bids."""
 
-import numpy as np
+import math
+from itertools import islice
 
 from staniel.cooperation.cost import Goal, Price, Prices
 from staniel.cooperation.ledger import Ledger
-from staniel.datatypes.belief import TrackId
 from staniel.datatypes.message import COST_TERMS, Announce, Bid, Handover, Revoke
 
 __all__ = ["Bidder"]
@@ -45,9 +45,11 @@ class Bidder:
     def _bid(self, wanted: list[Announce], prices: Prices) -> None:
         ledger, joint = self._ledger, self._ledger.config.award == "joint"
         offers = []
+        held = {lease.target for lease in ledger.leases.values()}
         goals = [Goal(m.position, m.course, m.speed) for m in wanted]
         for message, price in zip(wanted, prices(goals), strict=True):
-            price = self._with_handover(price, message.target)
+            if message.target in held:
+                price = self._with_handover(price)
             if joint or price.cost <= message.cost:
                 offers.append((message.target, message.sender, price))
         if offers and joint:
@@ -98,11 +100,9 @@ class Bidder:
             ledger.rename(own, target)
         return True
 
-    def _with_handover(self, price: Price, target: TrackId) -> Price:
+    def _with_handover(self, price: Price) -> Price:
         """The price of a target that another holds is higher by the hand-over margin."""
         margin = self._ledger.config.handover_margin
-        if all(lease.target != target for lease in self._ledger.leases.values()):
-            return price
         terms = list(price.terms)
         if terms:
             terms[_HANDOVER] = margin
@@ -113,7 +113,12 @@ def _first_names(announced: list[Announce], near: float) -> list[Announce]:
     """Without those at whose place another one is announced under an older name."""
     if len(announced) < 2:
         return announced
-    places = np.array([message.position for message in announced])
-    apart = places[:, None, :] - places
-    again = np.tril((apart * apart).sum(axis=2) <= near * near, -1).any(axis=1).tolist()
-    return [message for message, twice in zip(announced, again, strict=True) if not twice]
+    places = sorted((*message.position, k) for k, message in enumerate(announced))
+    again = set()
+    for i, (x, y, k) in enumerate(places):
+        for east, north, j in islice(places, i + 1, None):
+            if east - x > near:
+                break
+            if math.hypot(east - x, north - y) <= near:
+                again.add(max(j, k))
+    return [message for k, message in enumerate(announced) if k not in again]

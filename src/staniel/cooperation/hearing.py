@@ -1,8 +1,9 @@
 """What an agent makes of what it hears: leases, names, awards, and who leads."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from staniel.cooperation.ledger import Ledger
 from staniel.cooperation.table import Holding, Lease
@@ -39,6 +40,16 @@ class Hearing:
         self._ledger, self._centre = ledger, centre
         self._told: dict[int, int] = {}
         self._led_at = -math.inf
+        self._hearers: dict[type[Message], Callable[[Any], None]] = {
+            Heartbeat: self._hear_heartbeat,
+            Beacon: self._hear_beacon,
+            Bid: self._hear_bid,
+            Award: self._hear_award,
+            Acknowledge: self._hear_acknowledge,
+            Revoke: self._hear_revoke,
+            Handover: self._hear_handover,
+            Release: self._hear_release,
+        }
 
     @property
     def led(self) -> bool:
@@ -48,37 +59,34 @@ class Hearing:
 
     def hear(self, messages: Sequence[Message]) -> None:
         """Take in what arrived, then the awards to the agent itself, of which it takes the best."""
+        hearers = self._hearers
         for message in messages:
-            self._hear(message)
+            hear = hearers.get(type(message))
+            if hear is not None:
+                hear(message)
         agent = self._ledger.agent
-        self._take([m for m in messages if isinstance(m, Award) and m.winner == agent])
+        self._take([m for m in messages if type(m) is Award and m.winner == agent])
 
-    def _hear(self, message: Message) -> None:
-        match message:
-            case Heartbeat():
-                self._hear_heartbeat(message)
-            case Beacon() if message.sender == self._centre:
-                self._led_at = max(self._led_at, message.time)
-            case Bid():
-                self._ledger.bids.append((self._ledger.time, message))
-            case Award():
-                self._hear_award(message)
-            case Acknowledge(target=target, sender=sender):
-                self._settle(target, sender)
-            case Revoke():
-                self._hear_revoke(message)
-            case Handover():
-                auctions = self._ledger.auctions
-                self._ledger.elsewhere.pop(message.target, None)
-                if message.auctioneer == self._ledger.agent and message.target in auctions:
-                    auctions[message.target].holder = message.sender
-                    self._lease(message, message.held_as, message.cost)
-            case Release():
-                self._hear_release(message)
+    def _hear_beacon(self, message: Beacon) -> None:
+        if message.sender == self._centre:
+            self._led_at = max(self._led_at, message.time)
+
+    def _hear_bid(self, message: Bid) -> None:
+        self._ledger.bids.append((self._ledger.time, message))
+
+    def _hear_acknowledge(self, message: Acknowledge) -> None:
+        self._settle(message.target, message.sender)
+
+    def _hear_handover(self, message: Handover) -> None:
+        auctions = self._ledger.auctions
+        self._ledger.elsewhere.pop(message.target, None)
+        if message.auctioneer == self._ledger.agent and message.target in auctions:
+            auctions[message.target].holder = message.sender
+            self._lease(message, message.held_as, message.cost)
 
     def _hear_heartbeat(self, message: Heartbeat) -> None:
         ledger = self._ledger
-        target, sender, position = message.target, message.sender, message.target_position
+        sender = message.sender
         # What the sender said of itself since then, and was heard first, is the news.
         if message.sequence < self._told.get(sender, 0):
             return
@@ -86,6 +94,7 @@ class Hearing:
         ledger.beats[sender] = message
         if message.unheld:
             self._correct(ledger.unheld.hear(message.unheld, ledger.time))
+        target, position = message.target, message.target_position
         if target is None or position is None:
             lease = ledger.leases.get(sender)
             # Who says nothing of an award after it was made did not hear it.
@@ -209,11 +218,12 @@ class Hearing:
     def _lease(
         self, message: Message, target: TrackId, cost: float, holder: int | None = None
     ) -> None:
-        ledger, holder = self._ledger, message.sender if holder is None else holder
+        ledger, said = self._ledger, message.time
+        holder = message.sender if holder is None else holder
         known = ledger.leases.get(holder)
-        if known is None or known.said <= message.time:
-            ledger.leases[holder] = Lease(target, cost, message.time)
-            ledger.unheld.drop((target,))
+        if known is None or known.said <= said:
+            ledger.leases[holder] = Lease(target, cost, said)
+            ledger.unheld.drop(target)
 
 
 def _moved(message: Heartbeat, position: Point, time: float) -> Point:

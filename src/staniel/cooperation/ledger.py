@@ -121,7 +121,7 @@ class Ledger:
     @property
     def held(self) -> set[TrackId]:
         """Names of the targets that somebody is known to hold, or that are up for auction."""
-        names = {lease.target for lease in self.leases.values()} | set(self.auctions)
+        names = {lease.target for lease in self.leases.values()} | self.auctions.keys()
         return names if self.holding is None else names | {self.holding.id}
 
     @property
@@ -159,7 +159,7 @@ class Ledger:
         task = self.tasks.get(target)
         seen = self.unheld.seen(target, self.time) if task is None else task.last_seen
         self.holding = Holding(target, position, self.time, seen)
-        self.unheld.drop((target,))
+        self.unheld.drop(target)
 
     def let_go(self) -> None:
         """Leave the held target to others, and say so."""
@@ -188,7 +188,7 @@ class Ledger:
                 self.unheld.note(
                     Unheld(task.id, task.position, task.course, task.last_seen), self.time
                 )
-        self.unheld.drop(taken - set(self.auctions))
+        self.unheld.drop_all(taken - self.auctions.keys())
         # What goes by another name by now is not without a holder, or is told under that name.
         self._trails.note(self.time, self.tasks.values())
         speeds = {task.id: math.hypot(*task.velocity) for task in self.tasks.values()}

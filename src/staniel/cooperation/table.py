@@ -1,8 +1,9 @@
 """What an agent knows of who holds what, and of targets that nobody holds, as it heard it."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from staniel.cooperation.cost import Goal, Price
 from staniel.datatypes.belief import TrackId
@@ -64,8 +65,7 @@ class Holding:
     seen: float
 
 
-@dataclass(frozen=True, slots=True)
-class Lease:
+class Lease(NamedTuple):
     """What another agent holds, as of the message said at `said`."""
 
     target: TrackId
@@ -86,8 +86,7 @@ class Auction:
     tries: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class _Entry:
+class _Entry(NamedTuple):
     known: Unheld
     since: float
 
@@ -177,17 +176,21 @@ class UnheldTable:
     def bury(self, target: TrackId, time: float) -> None:
         """It is not where it was, or goes by another name: only a newer sighting counts."""
         self._gone[target] = max(time, self._gone.get(target, time))
-        self.drop((target,))
+        self.drop(target)
 
-    def drop(self, targets: Iterable[TrackId]) -> None:
-        """Somebody holds these, or they go by another name."""
-        for target in targets:
-            if self._entries.pop(target, None) is not None:
-                self._sorted, self._known = None, ()
+    def drop(self, target: TrackId) -> None:
+        """Somebody holds it, or it goes by another name."""
+        if self._entries.pop(target, None) is not None:
+            self._sorted, self._known = None, ()
+
+    def drop_all(self, targets: AbstractSet[TrackId]) -> None:
+        """As `drop`, many at once."""
+        for target in self._entries.keys() & targets:
+            self.drop(target)
 
     def forget(self, time: float) -> None:
         """Drop what nobody has seen for too long by `time` [s]."""
         oldest = time - self._memory
         for entry in [e for e in self._entries.values() if e.known.seen < oldest]:
-            self.drop((entry.known.target,))
+            self.drop(entry.known.target)
         self._gone = {k: v for k, v in self._gone.items() if v >= oldest}
