@@ -3,12 +3,14 @@
     python benchmarks/cooperation.py takeover --seeds 40
     python benchmarks/cooperation.py team --seeds 20
     python benchmarks/cooperation.py crowd --seeds 20
+    python benchmarks/cooperation.py help --seeds 20
     python benchmarks/cooperation.py round --seeds 5
 
 `takeover` kills aircraft 0 after two minutes, and says how long each vehicle that it held waited
 for another holder. `team` flies the same cities with auctions, with a ground station, with nobody
 sharing out, and with one aircraft. `crowd` has six vehicles for two aircraft, with and without
-patrols. `round` times 100 agents that share out 100 new targets.
+patrols. `help` has two vehicles for four aircraft that look ahead: nobody helps, who is asked does,
+or whoever is free. `round` times 100 agents that share out 100 new targets.
 """
 
 import argparse
@@ -136,6 +138,19 @@ def crowd(seeds: int) -> None:
     )
 
 
+def help_(seeds: int) -> None:
+    """Two vehicles, four aircraft, one plan for those that watch the same one."""
+    common = {"minutes": 10.0, "vehicles": {"count": 2}}
+    _compare(
+        {
+            f"help: {name}": common | {"cooperation": {"assistance": name}}
+            for name in ("none", "asked", "always")
+        },
+        seeds,
+        6000,
+    )
+
+
 def _spread(n: int, rng: np.random.Generator) -> list[tuple[float, float]]:
     """Places in a square, no two of which could be one target."""
     side = 150.0 * math.sqrt(n)
@@ -215,6 +230,7 @@ PARTS: dict[str, Callable[[int], None]] = {
     "takeover": takeover,
     "team": team,
     "crowd": crowd,
+    "help": help_,
     "round": round_,
 }
 

@@ -19,10 +19,9 @@ from staniel.cooperation import (
     CooperationConfig,
     CostModel,
     Gate,
-    Glimpse,
     Goal,
     Holding,
-    SearchMap,
+    Searcher,
     Situation,
     Task,
     priority_at,
@@ -31,9 +30,8 @@ from staniel.datatypes.belief import Belief, Percept, Pose, TrackEstimate, Track
 from staniel.datatypes.clock import Clock
 from staniel.datatypes.command import Command, FlyBanks, FlyLine, look_point
 from staniel.datatypes.equipment import Airframe, Camera, Lidar
-from staniel.datatypes.message import Heartbeat, Looked, Message, Point, Report, Warn
+from staniel.datatypes.message import Heartbeat, Message, Point, Report, Warn
 from staniel.datatypes.risk import CarriedThreat, RiskRegion
-from staniel.errors import StanielError
 from staniel.guidance import (
     GuidanceConfig,
     KnownDangers,
@@ -103,8 +101,6 @@ class Agent:
         What it holds true and does, as of the last step.
     dangers : KnownDangers
         What it was told and noticed of threats and no-fly regions.
-    refused : int
-        Words on what was looked at that were none, and were dropped.
     """
 
     def __init__(self, id: int, briefing: Briefing, rng: np.random.Generator) -> None:
@@ -122,22 +118,23 @@ class Agent:
             centre=briefing.centre,
         )
         self._assistance = Assistance(id, briefing.cooperation, step=clock.decision_step)
-        areas = briefing.cooperation.areas
         self._costs = CostModel(
-            briefing.cooperation.cost, airframe, briefing.camera, briefing.chart, areas
+            briefing.cooperation.cost,
+            airframe,
+            briefing.camera,
+            briefing.chart,
+            briefing.cooperation.areas,
         )
         self._visibility = 1.0
         self._arrived: float | None = None
-        self._search = SearchMap(
+        self._searcher = Searcher(
+            id,
             briefing.chart,
             airframe,
             briefing.camera,
-            cell=briefing.cooperation.search_cell,
-            areas=areas,
+            briefing.cooperation,
+            glimpse_time=briefing.guidance.glimpse_time,
         )
-        self._glimpse = Glimpse(briefing.guidance.glimpse_time)
-        self._shared_at = -math.inf
-        self._refused = 0
         self._pursue = pursuit_policy_named(briefing.guidance.pursuit)
         self._lookahead = briefing.guidance.prediction_steps * clock.decision_step
         self.dangers = KnownDangers(
@@ -191,7 +188,7 @@ class Agent:
             )
         if news:
             outbox.append(Warn(self.id, self._allocation.next_sequence(), time, threats=news))
-        outbox.extend(self._share(time))
+        outbox += self._searcher.tell(time, self._allocation.next_sequence)
         # Partners and those who avoid one another want to know what is flown.
         planned = role in ("pursue", "help") and isinstance(command, FlyBanks)
         told = command if planned or self._avoidance is not None else None
@@ -209,7 +206,7 @@ class Agent:
     def dropped(self) -> dict[str, int]:
         """How many messages it did not heed, by reason: see `staniel.cooperation.gate`."""
         counts = dict(self._gate.dropped)
-        counts["malformed"] += self._refused
+        counts["malformed"] += self._searcher.refused
         return counts
 
     def _avoid(
@@ -260,7 +257,7 @@ class Agent:
             lambda goals: self._costs.prices(situation, goals),
             health=fit or "healthy",
             alone=alone,
-            overdue=self._search.overdue(time, config.revisit_after),
+            overdue=self._searcher.overdue(time),
         )
         for old, new in allocation.renames:
             self._tracker.rename(old, new)
@@ -338,14 +335,14 @@ class Agent:
     ) -> tuple[Command, str, Point]:
         """Pursue the held target; else help; else loiter where one was; else search."""
         time, pose = percept.time, percept.pose
-        self._look_around(percept, inbox)
+        self._searcher.look_around(percept, self._look, inbox)
         held = self._allocation.holding
         if held is not None:
             track = self._track_named(held.id)
             if track is not None:
                 self._seen_holding = time
                 self._last_place = (held.position, time)
-                self._search.forget_goal()
+                self._searcher.forget_goal()
                 return *self._chase(time, pose, track, "pursue"), held.position
             self._give_up_in_time(time, pose, held, outbox)
         if self._allocation.patrolling:
@@ -355,18 +352,18 @@ class Agent:
         if self._last_place is not None:
             place, since = self._last_place
             if time - since <= self._briefing.guidance.recover_time:
-                self._search.forget_goal()
+                self._searcher.forget_goal()
                 return self._circle(pose, place), "recover", place
             self._last_place = None
         if not percept.health.camera:
             place = (pose.x, pose.y) if self.belief.role != "standby" else self.belief.goal
             return self._circle(pose, place), "standby", place
         role = "patrol" if self._allocation.patrolling else "search"
-        glimpsed = self._glimpsed(percept)
-        if glimpsed is not None and role == "search":
-            self._search.forget_goal()
-            return self._circle(pose, glimpsed), role, glimpsed
-        start, goal = self._search.leg(time, pose, self._lost_clouds)
+        second = self._second_look(percept)
+        if second is not None and role == "search":
+            self._searcher.forget_goal()
+            return self._circle(pose, second), role, second
+        start, goal = self._searcher.leg(time, pose, self._lost_clouds)
         airframe = self._briefing.airframe
         return FlyLine(start, goal, airframe.speed, airframe.altitude), role, goal
 
@@ -388,40 +385,17 @@ class Agent:
             outbox.append(self._allocation.give_up())
         self._last_place = (held.position, since)
 
-    def _glimpsed(self, percept: Percept) -> Point | None:
+    def _second_look(self, percept: Percept) -> Point | None:
         """Where the own camera saw something a moment ago that no track has explained since."""
-        near = self._briefing.cooperation.same_target
-        tracks = [(*track.position.tolist(),) for track in self._tracker.estimates]
         strange = [s for s in percept.sightings if self._tracker.owner_of(s) is None]
-        places = [(*sighting.position.tolist(),) for sighting in strange]
-        strangers = [z for z in places if all(math.dist(z, track) >= near for track in tracks)]
-        self._glimpse.note(percept.time, strangers, tracks)
-        return self._glimpse.place(percept.time)
+        return self._searcher.second_look(
+            percept.time,
+            [(*sighting.position.tolist(),) for sighting in strange],
+            [(*track.position.tolist(),) for track in self._tracker.estimates],
+        )
 
     def _circle(self, pose: Pose, place: Point) -> Command:
         return loiter(pose, place, self._briefing.airframe, self._briefing.guidance)
-
-    def _look_around(self, percept: Percept, inbox: Sequence[Message]) -> None:
-        """Note on the search map what was looked at, by this aircraft and as the others say."""
-        time = percept.time
-        if percept.health.camera:
-            self._search.look(time, percept.pose, self._look)
-        self._search.hear(message for message in inbox if isinstance(message, Heartbeat))
-        for message in inbox:
-            if isinstance(message, Looked):
-                try:
-                    self._search.take(message.cells, time)
-                except StanielError:
-                    self._refused += 1
-
-    def _share(self, time: float) -> list[Message]:
-        """What was looked at, for the others, every `share_every` seconds."""
-        every = self._briefing.cooperation.share_every
-        if every == 0.0 or time - self._shared_at < every:
-            return []
-        self._shared_at = time
-        cells = self._search.pack(time)
-        return [Looked(self.id, self._allocation.next_sequence(), time, cells=cells)]
 
     def _lost_clouds(self) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Where the lost targets may be that nobody is known to hold."""
@@ -432,7 +406,7 @@ class Agent:
     def _help(self, time: float, pose: Pose, target: TrackId) -> tuple[Command, str, Point]:
         """Plan with the holder where the policy can; else circle midway to it (thesis 7.2.1.1)."""
         self._last_place = None
-        self._search.forget_goal()
+        self._searcher.forget_goal()
         place, track = self._assistance.position, self._track_named(target)
         if track is not None and self._briefing.guidance.pursuit == "lookahead":
             return *self._chase(time, pose, track, "help"), place

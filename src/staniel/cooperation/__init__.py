@@ -6,8 +6,8 @@ from staniel.cooperation.auction import Assignment, assign
 from staniel.cooperation.config import Area, CooperationConfig, CostConfig, priority_at
 from staniel.cooperation.cost import CostModel, Goal, Price, Situation
 from staniel.cooperation.gate import Gate
-from staniel.cooperation.glimpse import Glimpse
 from staniel.cooperation.search import SearchMap
+from staniel.cooperation.searcher import Searcher
 from staniel.cooperation.table import Holding, Task
 
 __all__ = [
@@ -19,11 +19,11 @@ __all__ = [
     "CostConfig",
     "CostModel",
     "Gate",
-    "Glimpse",
     "Goal",
     "Holding",
     "Price",
     "SearchMap",
+    "Searcher",
     "Situation",
     "Task",
     "assign",
