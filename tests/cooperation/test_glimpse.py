@@ -6,8 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from staniel.cooperation import Glimpse
-from staniel.cooperation.glimpse import FASTEST, MOST, NEAR, REST
+from staniel.cooperation.glimpse import FASTEST, MOST, NEAR, REST, Glimpse
 
 STAY = 12.0
 
