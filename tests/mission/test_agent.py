@@ -195,7 +195,7 @@ def test_what_was_looked_at_is_said_every_so_often_and_heeded():
     assert [word.time for word in words] == [0.0, 5.0, 10.0]
     far = Pose(10.0, 10.0, 80.0, 0.0, 0.0, 15.0)
     hearer.step(percept(11, pose=far), [words[-1]])
-    news = hearer._search.ages
+    news = hearer._searcher._map.ages
     assert news[15, 7] == 10.0  # below the teller
     assert hearer.dropped["malformed"] == 0
 
